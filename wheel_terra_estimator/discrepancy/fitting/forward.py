@@ -264,7 +264,7 @@ class Forward:
             angles[live[finished]], solved[live[finished]] = angle[finished], outputs[finished]
             if finished.all():
                 break
-            with np.errstate(divide='ignore', invalid='ignore'):
+            with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
                 ratio = np.log(np.maximum(1.0 + relative, 1e-9))
                 if iteration == 0:
                     beyond, _ = self._response(contact, terms, angle * (1.0 + 1e-5))

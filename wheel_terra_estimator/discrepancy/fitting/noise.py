@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import bdtrc, chdtrc
 
 from wheel_terra_estimator.arrays import MAD_TO_STD, BoolArray, FloatArray
+from wheel_terra_estimator.discrepancy.fitting.evidence import log_sum
 from wheel_terra_estimator.discrepancy.fitting.gauss_newton import Fit
 from wheel_terra_estimator.discrepancy.fitting.problem import (
     OUTLIER_FACTOR,
@@ -128,9 +129,9 @@ def estimate_noise(
 ) -> Noise:
     """Estimate the noise of what was not repeated, beside soil and a smooth misfit.
 
-    The marginal likelihood of a smooth process, the soil's tangent space and white noise is
-    maximised over the noise of each quantity, so that effects do not pass for noise. What was
-    stated is known but for a factor.
+    The marginal likelihood of a smooth process, the soil's tangent space and white noise weighs the
+    noise of each quantity, so that effects do not pass for noise. What was stated is known but for
+    a factor.
     """
     unknown, stated = (
         [q for q, name in enumerate(QUANTITIES) if noise.origin.get(name) == origin]
@@ -154,14 +155,17 @@ def estimate_noise(
             sizes = np.outer(own, own)
             part = target[cells] / own, known[block] / sizes, smooth[block] / sizes
             if q in stated:  # whose own shape stays
-                std[:, q] = noise.std[:, q] * _white_part(*part, _STATED, 1.0, _TRUST)[0]
+                likely, _ = _white_part(*part, _STATED, 1.0, _TRUST)
+                std[:, q] = noise.std[:, q] * _STATED[np.argmax(likely)]
                 continue
-            value, count, score = _white_part(*part, _FACTORS, _USUAL, _SPREAD)
-            score -= float(np.log(own).sum())
+            likely, counts = _white_part(*part, _FACTORS, _USUAL, _SPREAD)
+            score = float(log_sum(likely) - np.log(own).sum())
             if score < best[q] + _CLEARLY:
                 continue
             best[q] = score
-            square = (value * usual[q]) ** 2
+            # Of few rows the most probable noise is mostly too small: the mean of its square.
+            square = np.exp(likely - log_sum(likely)) @ (_FACTORS * usual[q]) ** 2
+            count = max(counts[np.argmax(likely)], 2.0)
             unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
             weighed = (count * square + unseen) / (count + _UNSEEN)
             there = np.isfinite(noise.std[:, q])
@@ -176,20 +180,19 @@ def _white_part(
     factors: FloatArray,
     usual: float,  # centre of the prior; ``spread``: deviation of the logarithm
     spread: float,
-) -> tuple[float, float, float]:
-    """Return the most probable noise factor, its degrees of freedom and its log likelihood."""
-    found = []
+) -> tuple[FloatArray, FloatArray]:
+    """Return the log weight of noise factors, misfits of all sizes together, and their freedom."""
+    scores, counts = [], []
     for amplitude in _SMOOTH:
         values, vectors = np.linalg.eigh(known + amplitude**2 * smooth)
         power = (vectors.T @ target) ** 2
-        variance = np.maximum(values, 0.0)[None] + factors[:, None] ** 2
-        score = -0.5 * (np.log(variance) + power / variance).sum(axis=1)
-        score -= 0.5 * (np.log(factors / usual) / spread) ** 2
-        top = int(np.argmax(score))
-        share = factors[top] ** 2 / variance[top]
-        found.append((float(score[top]), float(factors[top]), float((share**2).sum())))
-    best, factor, count = max(found)
-    return factor, max(count, 2.0), best
+        square = factors[:, None] ** 2
+        variance = np.maximum(values, 0.0)[None] + square
+        scores.append(-0.5 * (np.log(variance) + power / variance).sum(axis=1))
+        counts.append(((square / variance) ** 2).sum(axis=1))
+    weights = log_sum(np.array(scores), axis=0)
+    best = np.argmax(scores, axis=0)
+    return weights - 0.5 * (np.log(factors / usual) / spread) ** 2, np.choose(best, counts)
 
 
 _ROBUST_FLOOR = 0.02  # structural error beside which outliers are sought [share of the range]
