@@ -36,15 +36,14 @@ SCATTER_CHANCE = 1e-3  # below which repeated rows do not have the stated noise
 # Amplitudes of the smooth misfit that compete while the noise is estimated: whatever is smooth,
 # effects included, must not be counted as noise.
 _SMOOTH = (0.01, 0.03, 0.1, 0.3, 1.0)
-_FIRST_GUESS = 0.01  # of the range
-_USUAL, _SPREAD = 1.5, 1.2  # weak prior of the factor on the guess: centre, width of its log
+_USUAL, _SPREAD = 0.02, 1.2  # of the range; width of the log in a weak prior
 # Factors on a guess, and on what is stated: readings scatter by no less than that, and seldom by
 # twice as much. Width of the log of the latter.
-_FACTORS, _STATED, _TRUST = np.geomspace(0.01, 30.0, 90), np.geomspace(1.0, 2.0, 30), 0.3
+_FACTORS, _STATED, _TRUST = np.geomspace(0.005, 15.0, 90), np.geomspace(1.0, 2.0, 30), 0.3
 _LEAST = 1e-4  # of the range: noise below it is a matter of rounding
 # A few smooth rows, read off a figure or averaged, hide by how much they are off: an estimate is at
-# least what it would be if so many cells more were off by this share of the range.
-_UNSEEN, _UNSEEN_NOISE = 4.0, 0.02
+# least what it would be if so many cells more were off by the usual noise.
+_UNSEEN = 4.0
 _CLEARLY = 3.0  # nats by which noise of another shape must be more likely
 
 
@@ -66,7 +65,7 @@ def stated_noise(
         if count:
             repeatability[quantity] = pooled, count
         given = here & np.isfinite(std[:, q])
-        origin[quantity], guess = 'estimated', _FIRST_GUESS * scale[q]
+        origin[quantity], guess = 'estimated', _USUAL * scale[q]
         if count >= ENOUGH_REPEATS:
             origin[quantity], guess = 'repeats', max(pooled, _LEAST * scale[q])
         if given.any():
@@ -155,10 +154,10 @@ def estimate_noise(
             sizes = np.outer(own, own)
             part = target[cells] / own, known[block] / sizes, smooth[block] / sizes
             if q in stated:  # whose own shape stays
-                likely, _ = _white_part(*part, _STATED, 1.0, _TRUST)
+                likely, _ = _white_part(*part, _STATED, _TRUST)
                 std[:, q] = noise.std[:, q] * _STATED[np.argmax(likely)]
                 continue
-            likely, counts = _white_part(*part, _FACTORS, _USUAL, _SPREAD)
+            likely, counts = _white_part(*part, _FACTORS, _SPREAD)
             score = float(log_sum(likely) - np.log(own).sum())
             if score < best[q] + _CLEARLY:
                 continue
@@ -166,7 +165,7 @@ def estimate_noise(
             # Of few rows the most probable noise is mostly too small: the mean of its square.
             square = np.exp(likely - log_sum(likely)) @ (_FACTORS * usual[q]) ** 2
             count = max(counts[np.argmax(likely)], 2.0)
-            unseen = _UNSEEN * (_UNSEEN_NOISE * problem.scale[q]) ** 2
+            unseen = _UNSEEN * (_USUAL * problem.scale[q]) ** 2
             weighed = (count * square + unseen) / (count + _UNSEEN)
             there = np.isfinite(noise.std[:, q])
             std[there, q] = math.sqrt(max(square, weighed)) * shape[there]
@@ -178,8 +177,7 @@ def _white_part(
     known: FloatArray,  # (k, k) covariance of what is no noise
     smooth: FloatArray,  # (k, k) covariance of the smooth misfit of amplitude 1
     factors: FloatArray,
-    usual: float,  # centre of the prior; ``spread``: deviation of the logarithm
-    spread: float,
+    spread: float,  # deviation of the logarithm in the prior
 ) -> tuple[FloatArray, FloatArray]:
     """Return the log weight of noise factors, misfits of all sizes together, and their freedom."""
     scores, counts = [], []
@@ -192,7 +190,7 @@ def _white_part(
         counts.append(((square / variance) ** 2).sum(axis=1))
     weights = log_sum(np.array(scores), axis=0)
     best = np.argmax(scores, axis=0)
-    return weights - 0.5 * (np.log(factors / usual) / spread) ** 2, np.choose(best, counts)
+    return weights - 0.5 * (np.log(factors) / spread) ** 2, np.choose(best, counts)
 
 
 _ROBUST_FLOOR = 0.02  # structural error beside which outliers are sought [share of the range]
