@@ -367,6 +367,27 @@ def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     assert (estimated(loud, -1) > 3.0 * estimated(loud)).any()
 
 
+def test_noise_of_six_rows_is_hardly_taken_for_less_than_it_is(forward, setting, rng):
+    soil, truth, std, inputs, scale = setting
+    guess = np.broadcast_to(0.02 * scale, truth.shape)
+    origin = dict.fromkeys(('sinkage', 'drawbar_pull', 'torque'), 'estimated')
+    ratios = []
+    for _ in range(60):
+        measured = truth + std * rng.standard_normal(truth.shape)
+        measured[rng.permutation(len(truth))[6:]] = np.nan
+        problem = build_problem(measured, guess, inputs, scale)
+        nothing = of_soil(forward, problem, soil, problem.variance(0.01))
+        found = noise.estimate_noise(
+            Noise(guess, origin),
+            nothing,
+            [np.ones(len(truth))],
+            lambda std, measured=measured: build_problem(measured, std, inputs, scale),
+        )
+        ratios.append(found.std[0, 0] / std[0, 0])
+    assert np.exp(np.mean(np.log(ratios))) > 0.7  # the most probable one: 0.64
+    assert np.sqrt(np.mean(np.square(ratios))) == pytest.approx(1.0, abs=0.15)
+
+
 def test_repeats_give_the_noise():
     rng = np.random.default_rng(2)
     slip = np.repeat(np.linspace(0.1, 0.8, 8), 5)
