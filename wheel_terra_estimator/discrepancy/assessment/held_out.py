@@ -40,7 +40,7 @@ def hold_out(
     a bound, one linear step ends far from the best.
     """
     problem = setting.problem
-    inverse = (problem.rotation.T / variance) @ problem.rotation  # (m, m), without free parameters
+    inverse = problem.inverse(variance)
     labels = np.unique(groups[groups >= 0])
     weights = [_without(inverse, np.flatnonzero(groups[problem.row] == k)) for k in labels]
     tasks = [(fitted, kept) for fitted in fits for kept in weights]

@@ -83,34 +83,36 @@ class Fit:
 class Descent:
     """One hypothesis on its way down the objective, by damped Gauss-Newton steps inside bounds."""
 
-    def __init__(self, coordinates: Sequence[Coordinate], start: FloatArray) -> None:
+    def __init__(
+        self, coordinates: Sequence[Coordinate], start: FloatArray, inverse: FloatArray
+    ) -> None:
         self.prior = loose_precision(coordinates)  # (P,) precision of u
         self._limits = bounds(coordinates)
+        self._inverse = inverse  # (m, m) inverse covariance of the cells
         self._damping = _LEAST_DAMPING
         self.objective = np.inf  # half of chi-square plus prior, at the best point
         self.trial = np.clip(np.asarray(start, dtype=float), *self._limits)  # to be looked at next
         self.going = True
 
-    def is_better(self, square: float) -> bool:
-        """Take the trial point, with its sum of squares, where the objective is no higher."""
-        objective = 0.5 * float(square + self.trial @ (self.prior * self.trial))
+    def is_better(self, residual: FloatArray, sensitivity: FloatArray) -> bool:
+        """Take the trial point, with what it leaves of the cells, if the objective is no higher."""
+        pull = self._inverse @ residual
+        objective = 0.5 * float(residual @ pull + self.trial @ (self.prior * self.trial))
         self._gain = self.objective - objective
         better = self._gain >= 0.0
         if better:
-            self._u, self.objective = self.trial, objective
+            self.u, self.objective = self.trial, objective
+            self._gradient = sensitivity.T @ pull - self.prior * self.u
+            self._precision = sensitivity.T @ self._inverse @ sensitivity + np.diag(self.prior)
         damping = self._damping
         eased, stiffened = max(_EASE * damping, _LEAST_DAMPING), max(_STIFFEN * damping, 1.0)
         self._damping = eased if better else stiffened
         return better
 
-    def step(self, precision: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Set the next trial point; return the way there, which stays inside the bounds.
-
-        At the best point, (P, P) precision, and gradient of the squares alone: where they fall.
-        """
-        u, (lower, upper) = self._u, self._limits
-        gradient = gradient - self.prior * u
-        damped = precision + self._damping * np.diag(np.diag(precision))
+    def step(self) -> FloatArray:
+        """Set the next trial point; return the way there, which stays inside the bounds."""
+        u, gradient, (lower, upper) = self.u, self._gradient, self._limits
+        damped = self._precision + self._damping * np.diag(np.diag(self._precision))
         free = np.ones(len(u), dtype=bool)
         step = np.zeros(len(u))
         # Few passes suffice: a coordinate that would leave its range stays at the bound.
@@ -128,7 +130,7 @@ class Descent:
             step[outside] = np.clip(new, lower, upper)[outside] - u[outside]
             free &= ~outside
         step = np.clip(u + step, lower, upper) - u
-        expected = float(gradient @ step - 0.5 * step @ precision @ step)
+        expected = float(gradient @ step - 0.5 * step @ self._precision @ step)
         self.trial = u + step
         self.going = expected >= _CLOSE_ENOUGH and not 0.0 <= self._gain < _CLOSE_ENOUGH
         return step
@@ -149,8 +151,9 @@ def fit(
     Each of the B hypotheses, (names, coordinates), has a start (P,), and entrance angles (N,) near
     its end.
     """
-    best, pulls = dict[int, Fit](), dict[int, FloatArray]()
-    ways = [Descent(h[1], start) for h, start in zip(hypotheses, starts, strict=True)]
+    every = kept or [problem.inverse(variance)] * len(hypotheses)
+    ways = [Descent(h[1], u, w) for h, u, w in zip(hypotheses, starts, every, strict=True)]
+    best = dict[int, tuple[FloatArray, FloatArray, FloatArray]]()
     angle = None if angles is None else np.array(angles, dtype=float)
     for _ in range(iterations):
         active = [b for b, way in enumerate(ways) if way.going]
@@ -164,35 +167,25 @@ def fit(
         if angle is None:
             angle = np.empty((len(ways), state.angle.shape[1]))
         for index, b in enumerate(active):
-            way, angle[b] = ways[b], state.angle[index]
-            residual = problem.residual(state.outputs[index])
-            weighted = residual / variance
-            if kept is not None:
-                residual = problem.wanted - problem.flat(state.outputs[index])
-                weighted = kept[b] @ residual
-            better = way.is_better(float(residual @ weighted))
+            way, outputs, angle[b] = ways[b], state.outputs[index], state.angle[index]
+            sensitivity = problem.flat(state.jacobian[index])
+            better = way.is_better(problem.wanted - problem.flat(outputs), sensitivity)
             if better:
-                sensitivity = problem.flat(state.jacobian[index])
-                best[b] = Fit(
-                    *hypotheses[b],
-                    way.trial,
-                    state.outputs[index],
-                    state.angle[index],
-                    sensitivity,
-                    residual,
-                    problem.rotation @ sensitivity,
-                    variance,
-                    way.objective,
-                    way.prior,
-                )
-                pulls[b] = weighted
-            here = best[b]
-            if kept is None:
-                step = way.step(here.precision(), here.jacobian.T @ pulls[b])
-            else:
-                precision = here.sensitivity.T @ kept[b] @ here.sensitivity + np.diag(here.prior)
-                step = way.step(precision, here.sensitivity.T @ pulls[b])
+                best[b] = outputs, state.angle[index], sensitivity
+            step = way.step()
             if better and way.going:
                 slope = state.angle_slope[index] @ step
                 angle[b] = np.clip(state.angle[index] + slope, *_ANGLES)
-    return [best[b] for b in range(len(ways))]
+    return [
+        Fit(
+            *hypotheses[b],
+            way.u,
+            *best[b],
+            problem.residual(best[b][0]),
+            problem.rotation @ best[b][2],
+            variance,
+            way.objective,
+            way.prior,
+        )
+        for b, way in enumerate(ways)
+    ]

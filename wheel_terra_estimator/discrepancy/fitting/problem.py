@@ -62,6 +62,10 @@ class Problem:
         """Return the (m, m) covariance of the cells by variances (m,) of the rotated axes."""
         return np.asarray((self.unrotation * variance) @ self.unrotation.T)
 
+    def inverse(self, variance: FloatArray) -> FloatArray:
+        """Return the inverse of that covariance."""
+        return np.asarray((self.rotation.T / variance) @ self.rotation)
+
     def flat(self, values: FloatArray) -> FloatArray:
         """Take the measured cells of an (N, 4, ...) array: (m, ...)."""
         return values[self.row, self.quantity]
