@@ -203,7 +203,7 @@ class Decider:
         return names, _least(names, odds) >= _LIKELY
 
     def _left_open(self, decision: Decision) -> Decision:
-        """Return an open decision with a law, where one helps, and the soil plainly refitted.
+        """Return an open decision, the soil plainly refitted, with a law that does better than that.
 
         Without a floor, which keeps the soil from the rows, it is nearer to the truth elsewhere.
         """
@@ -220,7 +220,9 @@ class Decider:
         nothing = setting.refit(nothing, variance, _LONG)
         plain = self._predicted(decision.verdict, [nothing], variance, 0.0)
         if decision.verdict.status == 'undecided' and not channels_off(plain.gap):
-            return replace(decision, proposal=law)  # what is off is so beside the floor alone
+            plain = decision  # what is off is so beside the floor alone
+        if law and not (law.soil_held or self._gap(plain).is_closed_by(law)):
+            law = None
         return replace(plain, floor=decision.floor, doubtful=decision.doubtful, proposal=law)
 
     def _judged(self, verdict: Verdict) -> Decision:

@@ -179,6 +179,11 @@ class Gap:
             return 0.0
         return 1.0 - math.sqrt(open_law / open_refit) if open_refit > 0.0 else 0.0
 
+    def is_closed_by(self, law: Proposal) -> bool:
+        """Return whether unseen slips are predicted better with a law than as reported without."""
+        both = {q: LeftOut(g.refit, law.gap[q].after) for q, g in self.reported.items()}
+        return self.closed({'slip': both}) > _CLOSED
+
 
 def propose(gap: Gap, *, hold_soil: bool = False) -> Proposal | None:
     """Return the law that the rows ask for; None where none predicts what was left out.

@@ -105,7 +105,7 @@ def in_words(diagnosis: Diagnosis) -> dict[str, list[str]]:
             'The proposed law leaves a plausible soil; the refit without it does not. '
             'A measured soil number decides between the two.'
         )
-    if diagnosis.proposal:
+    elif diagnosis.proposal:
         following.append('Until then use proposal.yaml, within the range of these rows only.')
     if not following and settled:
         following.append('Nothing; continue with model.yaml.')
