@@ -16,6 +16,7 @@ from test_workflow import FEW, make, run
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.discrepancy import proposal as proposals
 from wheel_terra_estimator.discrepancy.report.model_file import write_model
+from wheel_terra_estimator.discrepancy.report.words import in_words
 from wheel_terra_estimator.discrepancy.result import LeftOut, as_json
 from wheel_terra_estimator.discrepancy.workflow import Options
 from wheel_terra_estimator.errors import UserError
@@ -62,6 +63,7 @@ def test_the_law_is_found_and_said_in_words(speedy):
     at = list(zip(proposal.targets, proposal.features, strict=True)).index(('torque', 'rim_speed'))
     assert proposal.coefficients[at] == pytest.approx(SHARE, rel=0.25)
     assert abs(proposal.coefficients[at] - SHARE) < 4.0 * proposal.coefficients_std[at]
+    assert any('use proposal.yaml' in text for text in in_words(found)['next'])
     assert 'Torque grows by' in proposal.words
     assert 'per decade of rim speed' in proposal.words
     assert any('angular_velocity outside' in text for text in proposal.not_trusted)
@@ -149,6 +151,7 @@ def test_where_only_an_unbelievable_soil_fits_the_law_leaves_one_that_can_be_bel
     law = found.proposal
     assert law.soil_held
     assert as_json(law)['soil_held']
+    assert not any('use proposal.yaml' in text for text in in_words(found)['next'])
     far, near = (sum(shift.z_score**2 for shift in soil) for soil in (found.soil, law.soil))
     assert near < 0.2 * far
     for quantity in ('drawbar_pull', 'torque'):
@@ -192,6 +195,19 @@ def test_what_one_channel_picks_up_of_another_is_a_law_and_no_gain():
     assert change == pytest.approx(
         0.25 * pull / rows['normal_load'], abs=0.025
     )  # it bends towards its bound
+
+
+def test_a_law_is_offered_only_where_it_beats_the_refit_that_is_reported(monkeypatch):
+    reported = {'torque': SimpleNamespace(noise=1.0, refit=3.0)}
+
+    def is_closed(after):
+        law = SimpleNamespace(gap={'torque': SimpleNamespace(after=after)})
+        return proposals.Gap(None, None, reported, None).is_closed_by(law)
+
+    assert is_closed(2.5) and not is_closed(2.7)  # 19 and 11 %
+    monkeypatch.setattr(proposals.Gap, 'is_closed_by', lambda *_: False)
+    *_, found = with_decades(lambda table: SHARE)
+    assert (found.verdict, found.proposal) == ('unexplained', None)
 
 
 def _points(**changes):
