@@ -623,18 +623,18 @@ def rng():
     return np.random.default_rng(5)
 
 
-def test_precision_is_the_inverse_of_the_conditioned_covariance(rng):
+def test_covariance_is_that_of_the_conditioned_joint_one(rng):
     """Bayes for a linear model, by conditioning the joint Gaussian of parameters and readings."""
     jacobian, variance = rng.standard_normal((7, 3)), rng.uniform(0.2, 4.0, 7)
     prior = rng.uniform(0.5, 2.0, 3)
     nothing = np.zeros(0)
     found = Fit(
         (), (), nothing, nothing, nothing, nothing, nothing, jacobian, variance, 0.0, prior
-    ).precision()
+    ).covariance()
     before = np.diag(1.0 / prior)
     seen = jacobian @ before @ jacobian.T + np.diag(variance)
     after = before - before @ jacobian.T @ np.linalg.solve(seen, jacobian @ before)
-    np.testing.assert_allclose(np.linalg.inv(found), after, rtol=1e-10)
+    np.testing.assert_allclose(found, after, rtol=1e-10)
 
 
 def test_a_number_at_its_bound_is_the_bound():

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -54,14 +54,11 @@ class Fit:
     objective: float  # half of chi-square plus prior
     prior: FloatArray  # (P,) precision of u in the fit
 
-    def precision(self) -> FloatArray:
-        """Posterior precision of u."""
-        weighted = self.jacobian / self.variance[:, None]
-        return self.jacobian.T @ weighted + np.diag(self.prior)
-
     def covariance(self) -> FloatArray:
         """Posterior covariance of u."""
-        return np.asarray(np.linalg.inv(self.precision()), dtype=float)
+        weighted = self.jacobian / self.variance[:, None]
+        precision = self.jacobian.T @ weighted + np.diag(self.prior)
+        return np.asarray(np.linalg.inv(precision), dtype=float)
 
     def numbers(self) -> list[Number]:
         """Return the fitted numbers."""
@@ -70,14 +67,6 @@ class Fit:
             Number(c, u, round(float(c.value(u)), _DECIMALS) + 0.0, c.deviation(u, s), s)
             for c, u, s in zip(self.coordinates, self.u.tolist(), std.tolist(), strict=True)
         ]
-
-    def within(self, problem: Problem) -> Fit:
-        """Return the same fit seen through other noise: same cells, another rotation."""
-        return replace(
-            self,
-            residual=problem.residual(self.outputs),
-            jacobian=problem.rotation @ self.sensitivity,
-        )
 
 
 class Descent:

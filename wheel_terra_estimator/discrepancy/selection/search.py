@@ -312,10 +312,10 @@ class _Builder:
         for std, group in errors:
             self.let_err('slip', std, group, nothing)
         problem = self.build(noise_std, ())
-        here = nothing.within(problem)
-        target = here.residual + here.jacobian @ here.u
+        jacobian = problem.rotation @ nothing.sensitivity
+        target = problem.residual(nothing.outputs) + jacobian @ nothing.u
         variance = problem.variance(_LATENT_FLOOR)
-        cells = problem.rotation.T @ over_covariance(target, variance, here.jacobian)
+        cells = problem.rotation.T @ over_covariance(target, variance, jacobian)
         by_slip = problem.flat(self.by_input[0].slope)
         moved = np.zeros(len(slip))
         for std, group in errors:
