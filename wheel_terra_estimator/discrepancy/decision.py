@@ -203,7 +203,7 @@ class Decider:
         return names, _least(names, odds) >= _LIKELY
 
     def _left_open(self, decision: Decision) -> Decision:
-        """Return an open decision, the soil plainly refitted, with a law that does better than that.
+        """Return an open decision with the soil plainly refitted, and a law if it does better.
 
         Without a floor, which keeps the soil from the rows, it is nearer to the truth elsewhere.
         """
