@@ -367,6 +367,20 @@ def test_noise_is_estimated_beside_an_effect_and_never_none(forward, setting):
     assert (estimated(loud, -1) > 3.0 * estimated(loud)).any()
 
 
+def test_a_load_that_hardly_grows_with_the_angle_is_bracketed_without_a_warning(
+    forward, monkeypatch
+):
+    def step(_, contact, terms, angle):
+        share = np.where(angle < 0.5, 1e-6 * (1.0 + 1e-3 * angle), 2.0)
+        outputs = np.repeat(angle[..., None], 4, axis=-1)
+        return contact.normal_load * (share - 1.0), outputs
+
+    monkeypatch.setattr(Forward, '_response', step)
+    with np.errstate(over='raise'):
+        found = forward.solve([()], [np.zeros(0)], jacobian=False)
+    np.testing.assert_allclose(found.angle, 0.5, rtol=1e-6)
+
+
 def test_noise_of_six_rows_is_hardly_taken_for_less_than_it_is(forward, setting, rng):
     soil, truth, std, inputs, scale = setting
     guess = np.broadcast_to(0.02 * scale, truth.shape)
