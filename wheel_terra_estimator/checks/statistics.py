@@ -140,14 +140,14 @@ def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
-    """Return the mean of (k,) values over so many rows around each, zeros beyond the ends.
+    """Return the mean of (k,) values over so many rows around each, mirrored at the ends.
 
     Of a record that is shorter, over as many rows as there are.
     """
     from scipy.ndimage import uniform_filter1d  # heavy
 
     width = max(min(width, values.size), 1)
-    return np.asarray(uniform_filter1d(values, width, mode='constant'))
+    return np.asarray(uniform_filter1d(values, width))
 
 
 def without_drift(values: NDArray[Any], period: float, drift: float = DRIFT) -> NDArray[Any]:
