@@ -28,7 +28,6 @@ from wheel_terra_estimator.checks.series import (
     rows_of,
 )
 from wheel_terra_estimator.checks.statistics import (
-    DRIFT,
     Estimate,
     averaged,
     bend_noise,
@@ -422,11 +421,11 @@ RATIOS = (0.4, 2.5)  # measured over expected motion along an axis; beyond, it i
 YAW_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
-def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
+def _motions(evidence: Evidence) -> tuple[Complex, Complex] | None:
     """Return expected (by wheels and gyro) and measured specific force (k,) [m/s^2]; None: no IMU.
 
-    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
-    changes more slowly than over ``drift`` [s] is the slope.
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; the
+    slope changes more slowly.
     """
     if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
         return None
@@ -434,16 +433,16 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     width = max(round(0.4 / period), 1)
     speed = moving_mean(evidence.rim, width)
     curve = speed * moving_mean(evidence.gyro[:, 2], width)
-    motion = without_drift(np.gradient(speed, evidence.time) + 1j * curve, period, drift)
+    motion = without_drift(np.gradient(speed, evidence.time) + 1j * curve, period)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
-    seen = without_drift(along + 1j * across, period, drift)
+    seen = without_drift(along + 1j * across, period)
     return motion, seen
 
 
 @once
 def acceleration_fits(evidence: Evidence) -> tuple[Estimate, Estimate] | None:
     """Return measured over expected accelerations of starts (x) and curves (y); None: no IMU."""
-    both = _motions(evidence, DRIFT)
+    both = _motions(evidence)
     if both is None:
         return None
     motion, seen = both
@@ -467,9 +466,9 @@ def accelerometer_signs(evidence: Evidence) -> list[int]:
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 
-def mounting_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
+def mounting_yaw(evidence: Evidence) -> Estimate | None:
     """Return the angle by which a measured motion is rotated [rad]; None where it is not clear."""
-    both = _motions(evidence, drift)
+    both = _motions(evidence)
     if both is None:
         return None
     motion, seen = both

@@ -150,10 +150,10 @@ def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
     return np.asarray(uniform_filter1d(values, width))
 
 
-def without_drift(values: NDArray[Any], period: float, drift: float = DRIFT) -> NDArray[Any]:
-    """Return values less their mean over so many seconds: slopes change more slowly than speeds."""
+def without_drift(values: NDArray[Any], period: float) -> NDArray[Any]:
+    """Return values less their mean over `DRIFT`: slopes change more slowly than speeds."""
     values = values - values.mean()  # a zero of the sensor makes no steps at the ends
-    return np.asarray(values - moving_mean(values, max(round(drift / period), 3)))
+    return np.asarray(values - moving_mean(values, max(round(DRIFT / period), 3)))
 
 
 def bend_noise(values: FloatArray) -> float:
