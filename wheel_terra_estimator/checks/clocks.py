@@ -132,10 +132,10 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     for name, off in late.items():
         if abs(off.value) <= MOST_OFFSET:  # else another clock
             outcomes.append(_outcome(evidence, name, off, 'imu' in lags))
-    open_yet = [name for name, lag in lags.items() if abs(lag.value) > LEAST_OFFSET]
-    for name in open_yet * (not late):
-        words = {'topic': _channel(evidence, name).topic, 'off': lags[name].value}
-        outcomes.append(not_checked('delay', 'open', **words))
+    for name, lag in lags.items():
+        if not late and abs(lag.value) > LEAST_OFFSET:
+            topic = _channel(evidence, name).topic
+            outcomes.append(not_checked('delay', 'open', topic=topic, off=lag.value))
     outcomes += _too_late(evidence, {name: off.value for name, off in late.items()})
     reference, velocity = lags.get('reference'), evidence.recording.reference
     if reference and velocity is not None and reference.counts(evidence, 'reference'):

@@ -146,19 +146,12 @@ class Evidence:
     @cached_property
     def at_rest(self) -> Mask:
         """Rows in which every wheel has stood still for a while."""
-        rate = np.nan_to_num(self.rate)
-        width = self.rows_in(SHORTEST_REST)
-        if rate.shape[0] < width:
-            return np.zeros(rate.shape[0], dtype=bool)
-        total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
-        mean = np.zeros_like(rate)
-        mean[width - 1 :] = (total[width:] - total[:-width]) / width
-        limit = self.rest_rate
-        still = (np.abs(mean) <= limit).all(axis=1)
-        still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * self.rate_noise)
+        rate, width = np.nan_to_num(self.rate), self.rows_in(SHORTEST_REST)
+        mean = np.column_stack([moving_mean(one, width) for one in rate.T])
+        still = (np.abs(mean) <= self.rest_rate).all(axis=1)
+        still &= np.abs(rate).max(axis=1) <= max(self.rest_rate, 5.0 * self.rate_noise)
         still &= np.isfinite(self.rate).any(axis=1)
-        still[: width - 1] = False
-        return _shared(self._after(still, SHORTEST_REST))
+        return _shared(self._after(still, SETTLING + SHORTEST_REST))
 
     def _after(self, condition: Mask, duration: float) -> Mask:
         """Return where a condition has held for some time [s]."""
@@ -339,11 +332,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
         for index, name in enumerate(facts.configuration.wheels.steering_joints):
             if name in joints.names:
                 angle = joints.position[:, joints.names.index(name)]
-                known = np.flatnonzero(np.isfinite(angle) & (joints.stamp > 0))
-                known = known[np.argsort(joints.stamp[known], kind='stable')]
-                if known.size:
-                    at = (joints.stamp[known] - rows.stamp[0]) * 1e-9
-                    steering[:, index] = np.interp(time, at, angle[known])
+                steering[:, index] = nearest(joints.stamp, angle, rows.stamp)
     torque = facts.errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu

@@ -344,11 +344,6 @@ def _steered_as_turned(evidence: Evidence) -> _Steered:
     return told
 
 
-def _steered_against(evidence: Evidence) -> bool:
-    """Return whether wheels are steered to the right where the rover turns left."""
-    return bool((_steered_as_turned(evidence)[0] < -AS_TURNED).any())
-
-
 def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return x and y in each other's place by the sides in the names, and the evidence mended."""
     facts, wheels = evidence.facts, evidence.facts.configuration.wheels
@@ -552,7 +547,11 @@ def _swapped(evidence: Evidence, others: str) -> tuple[list[Outcome], Evidence]:
     order = sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
         both = mended, replace(mended, steering=mended.steering[:, order])
-        mended = min(both, key=lambda one: (_steered_against(one), left_in_turns(one)))
+
+        def held_against(one: Evidence) -> tuple[bool, float]:
+            return bool((_steered_as_turned(one).gain < -AS_TURNED).any()), left_in_turns(one)
+
+        mended = min(both, key=held_against)
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
