@@ -152,15 +152,13 @@ def _up_by_orientation(imu: ImuSeries, facts: RoverFacts) -> Judged:
     difference = math.acos(float(np.clip(np.median(up) / size, -1.0, 1.0)))
     upright = float((facts.mounting @ np.median(imu.force, axis=0))[2]) > 0.0
     turned_round = difference > math.pi - UP_DIFFERENCE and not upright  # see `check_upside`
-    if turned_round:
-        return [], imu
     how = ''
     if difference >= UP_DIFFERENCE:
         how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees'
         how += ' apart'
     elif _against(size * world.inv().as_matrix()[:, :, 2], force, imu.seconds[some]) < AGAINST:
         how = 'where its up leans one way, that of linear_acceleration leans the other'
-    if not how:
+    if turned_round or not how:
         return [], imu
     return [found('orientation', imu.topic, 0.97, how=how)], _without(imu, 'orientation')
 
