@@ -564,7 +564,8 @@ def test_wheels_that_fight_on_firm_ground_have_no_wrong_sign(torques, told):
     motion = rolling.motion(60.0, ([3.0, 6.0], [0.0, 0.3]))
     whole = rolling.recording(motion)
     noise = 0.02 * np.random.default_rng(1).standard_normal(whole.joints.torque.shape)
-    torque = np.outer(motion.speed / motion.speed.max(), torques) + noise
+    starts = rolling.MASS * rolling.RADIUS / 4.0 * np.gradient(motion.speed, motion.time)
+    torque = np.outer(motion.speed > 0.0, torques) + np.outer(starts, np.sign(torques)) + noise
     report = rolling.checked(whole=whole, joints={'torque': torque})
     assert ('torque_sign' in faults(report)) == told
 
@@ -985,3 +986,52 @@ def test_stamps_that_are_late_by_half_a_swing_reverse_nothing(late):
         whole=whole, imu={'stamp': stamp, 'log_time': stamp + 2_000_000}, sinkage=None
     ).findings
     assert told.fault == 'imu_offset' and told.value == pytest.approx(late, abs=0.1)
+
+
+@pytest.mark.parametrize('seconds', [12.0, 30.0])
+def test_wheels_that_hold_a_heading_on_uneven_soil_are_on_their_sides(seconds):
+    """Soil turns the rover to the right by 0.03 rad/s while its wheels steer to the left."""
+    speed, veer = ([4.0, 5.0], [0.0, 0.3]), [20.0, 21.0, 20.0 + seconds, 21.0 + seconds]
+    turned, wheels = (
+        rolling.driven(70.0, speed, yaw=(veer, [0.0, yaw, yaw, 0.0])) for yaw in (-0.03, 0.03)
+    )
+    told = faults(checked(whole=turned, joints={'rate': wheels.joints.rate}, reference=None))
+    assert ('swapped_sides' in told) == (seconds > 20.0)
+
+
+def test_a_short_turn_against_wheels_and_orientation_blames_no_orientation_for_sure():
+    yaw = [20.0, 21.0, 30.5, 31.5], [0.0, 0.04, 0.04, 0.0]
+    turn = rolling.driven(60.0, ([4.0, 5.0], [0.0, 0.3]), yaw=yaw)
+    half = 0.5 * np.cumsum(turn.imu.rate[:, 2]) * 0.04
+    oriented = np.column_stack([0.0 * half, 0.0 * half, np.sin(half), np.cos(half)])
+    imu = {'rate': turn.imu.rate * [1.0, 1.0, -1.0], 'orientation': oriented}
+    told = [f for f in checked(whole=turn, imu=imu).findings if f.fault == 'orientation']
+    assert [f.confidence for f in told] == [0.5]
+
+
+def test_a_velocity_in_the_world_is_no_reversed_one_where_the_drive_begins_to_the_west():
+    heading = math.pi + np.cumsum(rolling.ten_minute_drive().yaw_rate)[::5] / rolling.RATE
+    velocity = WHOLE.reference.velocity[:, :1] * np.column_stack(
+        [np.cos(heading), np.sin(heading), 0.0 * heading]
+    )
+    assert faults(checked(reference={'velocity': velocity})) == ['reference_world']
+
+
+def test_an_orientation_beside_a_reversed_accelerometer_is_right():
+    """On a hill both lean opposite ways, and up is down all the time: no orientation does that."""
+    motion = rolling.ten_minute_drive()
+    angles = np.column_stack([np.cumsum(motion.yaw_rate) * 0.1, -motion.slope])
+    at = np.column_stack([np.interp(WHOLE.imu.seconds, motion.time, one) for one in angles.T])
+    oriented = scipy.spatial.transform.Rotation.from_euler('ZY', at).as_quat()
+    imu = {'force': -WHOLE.imu.force, 'orientation': oriented}
+    assert faults(checked(imu=imu)) == ['force_reversed']
+
+
+@pytest.mark.parametrize('step', [0.01, 0.5])
+def test_zeros_between_rates_of_few_counts_are_counts(step):
+    """A steady drive; of a fine encoder no reading between two at speed is 0."""
+    whole = rolling.driven(60.0, ([2.0, 3.0], [0.0, 0.3]))
+    random = np.random.default_rng(3)
+    rate = step * np.floor(whole.joints.rate / step + random.uniform(size=whole.joints.rate.shape))
+    rate[random.choice(500, 40, replace=False) + 60, 1] = 0.0
+    assert ('rate_zeros' in faults(checked(whole=whole, joints={'rate': rate}))) == (step < 0.1)

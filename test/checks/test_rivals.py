@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 import rolling_rover as rolling
 
+from wheel_terra_estimator.checks import clocks
+from wheel_terra_estimator.checks.finding import not_checked
+from wheel_terra_estimator.checks.statistics import Trial, moving_mean
+
 WHOLE = rolling.recording()
 
 
@@ -86,3 +90,42 @@ def test_an_accelerometer_reversed_beside_wheels_that_count_backwards(backwards)
     assert told['backwards'].wheel == ', '.join(
         name for name, sign in zip(rolling.NAMES, backwards, strict=True) if sign < 0
     )
+
+
+def lag(value, std, trial=(0.8, 0.2)):
+    halves = (value - std, value + std)
+    return clocks.Lag(value, 'starts', halves, Trial(*trial))
+
+
+@pytest.mark.parametrize(
+    ('imu', 'reference', 'told'),
+    [
+        (lag(-0.7, 0.11, (0.8, 0.68)), lag(-0.75, 0.01), ('wheel_odometry_offset', 0.97)),
+        (lag(0.0, 0.01), lag(-0.75, 0.01), ('reference_offset', 0.97)),
+        (None, lag(-0.75, 0.01), ('reference_offset', 0.5)),  # or the wheels are late
+        (None, lag(0.75, 0.01), ('reference_offset', 0.97)),
+        (lag(0.6, 0.25), None, None),
+        (lag(0.02, 0.25), None, None),
+    ],
+)
+def test_which_stamps_are_off_for_sure(monkeypatch, imu, reference, told):
+    """The one that is off against both others; a lag that is not clear is left open."""
+    nothing = not_checked('delay', 'seldom')
+    monkeypatch.setattr(clocks, '_of_imu', lambda _: imu or nothing)
+    monkeypatch.setattr(clocks, '_of_reference', lambda _: reference or nothing)
+    arrival = WHOLE.reference.log_time + 1_000_000_000  # of stamps that may be early
+    report = rolling.checked(reference={'log_time': arrival})
+    delays = [(f.fault, f.confidence) for f in report.findings if f.kind == 'delay']
+    assert delays == ([told] if told else [])
+    left_open = [n.reason for n in report.not_checked if 'stamps look' in n.reason]
+    assert len(left_open) == (not told and imu.value > 0.2)
+
+
+def test_a_recording_that_ends_on_a_slope_shows_no_stop_there():
+    """Means at its ends are those of what was read: a late IMU is told by the starts alone."""
+    assert moving_mean(np.full(50, 3.0), 9) == pytest.approx(3.0)
+    speed = [4, 5, 14, 15, 19, 20, 34, 35, 39, 40], [0, 0.3, 0.3, 0, 0, 0.3, 0.3, 0, 0, 0.3]
+    whole = rolling.driven(60.0, speed, slope=([44.0, 50.0], [0.0, 0.2]))
+    imu = {name: getattr(whole.imu, name) + 600_000_000 for name in ('stamp', 'log_time')}
+    told = {f.fault: f for f in rolling.checked(whole=whole, imu=imu).findings}
+    assert told['imu_offset'].value == pytest.approx(0.6, abs=0.1)

@@ -131,7 +131,11 @@ def check_clocks(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     late = _late_channels(evidence, lags)
     for name, off in late.items():
         if abs(off.value) <= MOST_OFFSET:  # else another clock
-            outcomes.append(_outcome(evidence, name, off))
+            outcomes.append(_outcome(evidence, name, off, 'imu' in lags))
+    for name, lag in lags.items():
+        if not late and abs(lag.value) > LEAST_OFFSET:
+            topic = _channel(evidence, name).topic
+            outcomes.append(not_checked('delay', 'open', topic=topic, off=lag.value))
     outcomes += _too_late(evidence, {name: off.value for name, off in late.items()})
     reference, velocity = lags.get('reference'), evidence.recording.reference
     if reference and velocity is not None and reference.counts(evidence, 'reference'):
@@ -187,7 +191,7 @@ def _late_channels(evidence: Evidence, lags: dict[str, Lag]) -> dict[str, Lag]:
         imu, reference = late['imu'], late['reference']
         std = math.hypot(*(_whole_std(evidence, *lag) for lag in late.items()))
         if abs(imu.value - reference.value) < max(AGREEING_LAGS, 3.0 * std):
-            return {'wheel_odometry': imu.of_the_first()}
+            return {'wheel_odometry': min(imu, reference, key=lambda lag: lag.std).of_the_first()}
         return late
     for name, lag in late.items():
         other = next((lag for key, lag in lags.items() if key != name), None)
@@ -225,7 +229,7 @@ def _channel(evidence: Evidence, name: str) -> Channel:
     return channel
 
 
-def _outcome(evidence: Evidence, name: str, lag: Lag) -> Outcome:
+def _outcome(evidence: Evidence, name: str, lag: Lag, by_imu: bool) -> Outcome:
     channel = _channel(evidence, name)
     if not lag.steady:
         off = ' and '.join(f'{late:+.2f} s' for late in lag.halves)
@@ -239,6 +243,8 @@ def _outcome(evidence: Evidence, name: str, lag: Lag) -> Outcome:
             alternative = ', or its messages come late'
     elif abs(lag.value) < CHASSIS_SIGMAS * LEAST_STD[lag.by] and not in_future:
         alternative = ', or chassis, soil or filters lag so much'
+    elif name == 'reference' and lag.value < 0.0 and not by_imu:
+        alternative = ', or those of the wheels are too late: drive circles'
     if alternative:
         against, sure = f'{against}{alternative}', 0.5
     details = of_offset(name, lag.value, std, against, evidence.facts)

@@ -28,7 +28,6 @@ from wheel_terra_estimator.checks.series import (
     rows_of,
 )
 from wheel_terra_estimator.checks.statistics import (
-    DRIFT,
     Estimate,
     averaged,
     bend_noise,
@@ -147,19 +146,12 @@ class Evidence:
     @cached_property
     def at_rest(self) -> Mask:
         """Rows in which every wheel has stood still for a while."""
-        rate = np.nan_to_num(self.rate)
-        width = self.rows_in(SHORTEST_REST)
-        if rate.shape[0] < width:
-            return np.zeros(rate.shape[0], dtype=bool)
-        total = np.vstack([np.zeros(rate.shape[1]), np.cumsum(rate, axis=0)])
-        mean = np.zeros_like(rate)
-        mean[width - 1 :] = (total[width:] - total[:-width]) / width
-        limit = self.rest_rate
-        still = (np.abs(mean) <= limit).all(axis=1)
-        still &= np.abs(rate).max(axis=1) <= max(limit, 5.0 * self.rate_noise)
+        rate, width = np.nan_to_num(self.rate), self.rows_in(SHORTEST_REST)
+        mean = np.column_stack([moving_mean(one, width) for one in rate.T])
+        still = (np.abs(mean) <= self.rest_rate).all(axis=1)
+        still &= np.abs(rate).max(axis=1) <= max(self.rest_rate, 5.0 * self.rate_noise)
         still &= np.isfinite(self.rate).any(axis=1)
-        still[: width - 1] = False
-        return _shared(self._after(still, SHORTEST_REST))
+        return _shared(self._after(still, SETTLING + SHORTEST_REST))
 
     def _after(self, condition: Mask, duration: float) -> Mask:
         """Return where a condition has held for some time [s]."""
@@ -340,11 +332,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
         for index, name in enumerate(facts.configuration.wheels.steering_joints):
             if name in joints.names:
                 angle = joints.position[:, joints.names.index(name)]
-                known = np.flatnonzero(np.isfinite(angle) & (joints.stamp > 0))
-                known = known[np.argsort(joints.stamp[known], kind='stable')]
-                if known.size:
-                    at = (joints.stamp[known] - rows.stamp[0]) * 1e-9
-                    steering[:, index] = np.interp(time, at, angle[known])
+                steering[:, index] = nearest(joints.stamp, angle, rows.stamp)
     torque = facts.errors.torque.true(torque)
     force = gyro = None
     imu = recording.imu
@@ -422,11 +410,11 @@ RATIOS = (0.4, 2.5)  # measured over expected motion along an axis; beyond, it i
 YAW_BLOCKS = 10  # parts of a drive that a deviation comes from
 
 
-def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None:
+def _motions(evidence: Evidence) -> tuple[Complex, Complex] | None:
     """Return expected (by wheels and gyro) and measured specific force (k,) [m/s^2]; None: no IMU.
 
-    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; what
-    changes more slowly than over ``drift`` [s] is the slope.
+    Along x the acceleration of starts and stops, along y that of curves, as complex numbers; the
+    slope changes more slowly.
     """
     if evidence.force is None or evidence.gyro is None or evidence.time.size < 100:
         return None
@@ -434,16 +422,16 @@ def _motions(evidence: Evidence, drift: float) -> tuple[Complex, Complex] | None
     width = max(round(0.4 / period), 1)
     speed = moving_mean(evidence.rim, width)
     curve = speed * moving_mean(evidence.gyro[:, 2], width)
-    motion = without_drift(np.gradient(speed, evidence.time) + 1j * curve, period, drift)
+    motion = without_drift(np.gradient(speed, evidence.time) + 1j * curve, period)
     along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
-    seen = without_drift(along + 1j * across, period, drift)
+    seen = without_drift(along + 1j * across, period)
     return motion, seen
 
 
 @once
 def acceleration_fits(evidence: Evidence) -> tuple[Estimate, Estimate] | None:
     """Return measured over expected accelerations of starts (x) and curves (y); None: no IMU."""
-    both = _motions(evidence, DRIFT)
+    both = _motions(evidence)
     if both is None:
         return None
     motion, seen = both
@@ -467,9 +455,9 @@ def accelerometer_signs(evidence: Evidence) -> list[int]:
     return [int(np.sign(f.value)) * there for f, there in zip(fits, clear, strict=True)]
 
 
-def mounting_yaw(evidence: Evidence, drift: float = DRIFT) -> Estimate | None:
+def mounting_yaw(evidence: Evidence) -> Estimate | None:
     """Return the angle by which a measured motion is rotated [rad]; None where it is not clear."""
-    both = _motions(evidence, drift)
+    both = _motions(evidence)
     if both is None:
         return None
     motion, seen = both

@@ -36,7 +36,6 @@ from wheel_terra_estimator.checks.finding import (
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import ImuSeries, Recording, rows_of
 from wheel_terra_estimator.checks.statistics import (
-    DRIFT,
     UNIFORM_STD,
     Estimate,
     block_fit,
@@ -154,12 +153,12 @@ def _up_by_orientation(imu: ImuSeries, facts: RoverFacts) -> Judged:
     upright = float((facts.mounting @ np.median(imu.force, axis=0))[2]) > 0.0
     turned_round = difference > math.pi - UP_DIFFERENCE and not upright  # see `check_upside`
     how = ''
-    if difference >= UP_DIFFERENCE and not turned_round:
+    if difference >= UP_DIFFERENCE:
         how = f'its up and that of linear_acceleration lie {math.degrees(difference):.0f} degrees'
         how += ' apart'
     elif _against(size * world.inv().as_matrix()[:, :, 2], force, imu.seconds[some]) < AGAINST:
         how = 'where its up leans one way, that of linear_acceleration leans the other'
-    if not how:
+    if turned_round or not how:
         return [], imu
     return [found('orientation', imu.topic, 0.97, how=how)], _without(imu, 'orientation')
 
@@ -307,10 +306,7 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
         up = nearest
     if up[2] == -1.0:
         return np.diag([1.0, -1.0, -1.0])  # about x: about y the slope would turn round as well
-    axis = np.cross(up, [0.0, 0.0, 1.0])
-    sine = float(np.linalg.norm(axis))
-    turn = math.atan2(sine, float(up[2])) * axis / max(sine, 1e-9)
-    return np.asarray(Rotation.from_rotvec(turn).as_matrix())
+    return np.asarray(Rotation.align_vectors([0.0, 0.0, 1.0], up)[0].as_matrix())
 
 
 def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, FloatArray] | None:
@@ -401,13 +397,10 @@ def check_yaw(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     starts, curves = accelerometer_signs(evidence)
     if starts * curves < 0 and turns_upright(evidence) > CLEAR_AGREEMENT:
         return [evidence.found('force_axes', 0.95)], replace(evidence, force=None)
-    seen, quick = mounting_yaw(evidence), mounting_yaw(evidence, 0.5 * DRIFT)
-    if seen is None or quick is None:
+    seen = mounting_yaw(evidence)
+    if seen is None:
         return [not_checked('mounting', 'no_starts')], evidence
-    # Slopes at the places of starts and stops fall off faster than these: a rover that goes to and
-    # fro feels the same ones each time.
-    difference = math.remainder(seen.value - quick.value, 2.0 * math.pi)
-    seen = Estimate(seen.value, math.hypot(seen.std, 0.5 * difference, YAW_MODEL_STD))
+    seen = Estimate(seen.value, math.hypot(seen.std, YAW_MODEL_STD))
     evidence.figures['imu.yaw_deg'] = round(math.degrees(seen.value), 2)
     if abs(seen.value) < LEAST_YAW or seen.sigmas_from(0.0) < YAW_SIGMAS:
         unclear = not_checked('mounting', 'yaw_open', least=math.degrees(YAW_SIGMAS * seen.std))

@@ -221,6 +221,13 @@ def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [evidence.found('reference_turned', 0.5, value=angle, angle=angle)], mended
 
 
+def in_another_frame(evidence: Evidence) -> bool:
+    """Return whether there is a reference, and not along x of the rover."""
+    there, reference = _beside_rims(evidence), evidence.recording.reference
+    aside = reference is not None and reference.points_aside
+    return aside or (there is not None and _direction(evidence, *there)[1])
+
+
 def _direction(
     evidence: Evidence, reference: VelocitySeries, rim: FloatArray
 ) -> tuple[complex, bool]:

@@ -140,20 +140,20 @@ def _solve(normal: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def moving_mean(values: NDArray[Any], width: int) -> NDArray[Any]:
-    """Return the mean of (k,) values over so many rows around each, zeros beyond the ends.
+    """Return the mean of (k,) values over so many rows around each, mirrored at the ends.
 
     Of a record that is shorter, over as many rows as there are.
     """
     from scipy.ndimage import uniform_filter1d  # heavy
 
     width = max(min(width, values.size), 1)
-    return np.asarray(uniform_filter1d(values, width, mode='constant'))
+    return np.asarray(uniform_filter1d(values, width))
 
 
-def without_drift(values: NDArray[Any], period: float, drift: float = DRIFT) -> NDArray[Any]:
-    """Return values less their mean over so many seconds: slopes change more slowly than speeds."""
+def without_drift(values: NDArray[Any], period: float) -> NDArray[Any]:
+    """Return values less their mean over `DRIFT`: slopes change more slowly than speeds."""
     values = values - values.mean()  # a zero of the sensor makes no steps at the ends
-    return np.asarray(values - moving_mean(values, max(round(drift / period), 3)))
+    return np.asarray(values - moving_mean(values, max(round(DRIFT / period), 3)))
 
 
 def bend_noise(values: FloatArray) -> float:

@@ -161,9 +161,7 @@ def responses(evidence: Evidence) -> list[tuple[Estimate, Estimate]] | None:
         return None
     yaw = mounting_yaw(evidence)
     width = evidence.rows_in(SETTLING)
-    along, across = (moving_mean(column, width) for column in evidence.force[:, :2].T)
-    if yaw is not None:
-        along = along * math.cos(yaw.value) + across * math.sin(yaw.value)
+    along = moving_mean(evidence.force[:, 0], width)
     design = np.column_stack([along, sense, np.ones(sense.size)])[rows]
     size = np.nan_to_num(np.abs(evidence.rate), nan=evidence.working_rate)
     turns = [moving_mean(one, width) > evidence.rest_rate for one in size.T]

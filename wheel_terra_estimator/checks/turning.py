@@ -38,7 +38,7 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     not_checked,
 )
-from wheel_terra_estimator.checks.reference import CLEAR_SPEED
+from wheel_terra_estimator.checks.reference import CLEAR_SPEED, in_another_frame
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
@@ -65,6 +65,7 @@ LEAST_STEERING_ZERO = math.radians(5.0)  # beyond what wheels slip aside [rad]
 LEAST_ACROSS = math.radians(1.0)  # error in turns of two joints that are exchanged [rad]
 LEFT_CROSSED = 0.25  # the same with them exchanged back, over that without, at most [-]
 LEAST_ASKED = 0.1  # speed aside in turns over that ahead, of a wheel that has to steer [-]
+HOLDS_HEADING = 0.5  # range of headings of a rover that is to drive straight, at most [rad]
 LEAST_HEADINGS = 1.0  # turn in a drive that is not all on one cross slope [rad]
 MOST_WHEELS = 10  # wheels for which all combinations of signs are tried
 LEAST_TURNING_ROWS = 40  # rows with a turn by the gyro that the wheels must account for
@@ -238,7 +239,7 @@ def stretch_of(evidence: Evidence, there: NDArray[np.intp], rows: Mask) -> Turni
     speed = (evidence.rate * evidence.radius)[keep][:, there]
     along = np.cos(np.nan_to_num(evidence.steering[keep][:, there]))
     reference, ahead = evidence.recording.reference, np.zeros(keep.size)
-    if reference is not None and not reference.points_aside:
+    if reference is not None and not in_another_frame(evidence):
         forward = np.nan_to_num(reference.velocity[:, 0])
         ahead = np.interp(evidence.time[keep], evidence.seconds(reference), forward)
         least = max(GOING * np.quantile(np.abs(ahead), 0.9), CLEAR_SPEED * bend_noise(forward))
@@ -343,11 +344,6 @@ def _steered_as_turned(evidence: Evidence) -> _Steered:
     return told
 
 
-def _steered_against(evidence: Evidence) -> bool:
-    """Return whether wheels are steered to the right where the rover turns left."""
-    return bool((_steered_as_turned(evidence)[0] < -AS_TURNED).any())
-
-
 def check_axes(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return x and y in each other's place by the sides in the names, and the evidence mended."""
     facts, wheels = evidence.facts, evidence.facts.configuration.wheels
@@ -375,6 +371,8 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence)
     signs, turn, mended = chosen.signs, chosen.track, evidence
+    if turn < 0.0 and np.ptp(np.cumsum(evidence.yaw)) * evidence.period < HOLDS_HEADING:
+        turn = 0.0  # wheels may counter what the soil turns the rover by
     if chosen.exchanged:
         finding, mended = _exchanged(evidence, chosen)
         outcomes.append(finding)
@@ -497,7 +495,7 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
     """Return how the common speed agrees with reference and specific force; None: not told."""
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
-    if reference is not None and not reference.points_aside:
+    if reference is not None and not in_another_frame(evidence):
         sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed)))
         forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
         most = 2.0 * float(np.median(np.abs(forward[sense != 0.0]))) if sense.any() else 0.0
@@ -549,7 +547,11 @@ def _swapped(evidence: Evidence, others: str) -> tuple[list[Outcome], Evidence]:
     order = sides_exchanged(facts)
     if np.isfinite(evidence.steering).any():  # steering joints are named as before, or with it
         both = mended, replace(mended, steering=mended.steering[:, order])
-        mended = min(both, key=lambda one: (_steered_against(one), left_in_turns(one)))
+
+        def held_against(one: Evidence) -> tuple[bool, float]:
+            return bool((_steered_as_turned(one).gain < -AS_TURNED).any()), left_in_turns(one)
+
+        mended = min(both, key=held_against)
     sides = evidence.found(
         'swapped_sides',
         0.97 if sense else 0.5,
@@ -636,7 +638,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if imu is None or evidence.gyro is None:
         return [], evidence
     if _turns_as_oriented(evidence, imu, LEAST_TURNED) < 0:
-        told = track_ratio(evidence) is not None  # the gyro turns as the wheels do here
+        told = (track_ratio(evidence) or 0.0) > 0.0  # the gyro turns as the wheels do here
         how = (
             f'it turns against {"gyro and wheels" if told else "the gyro, or the gyro is reversed"}'
         )

@@ -53,6 +53,7 @@ FINE = 50  # different rates of one that is not coarse, at least
 SAME_CHANGES = 0.95  # share of the changes of two rates that are the same of one sent twice [-]
 LEAST_CHANGES = 30
 SHORT_ZERO, MANY_ZEROS = 0.3, 10  # time of zeros between rates of driving [s], and their number
+FEW_COUNTS = 0.1  # step of a rate over its usual size of which a zero may be rounded [-]
 FEW_ZEROS = 3  # the same of a reference while the wheels show that the rover drives
 LIVELY = 0.3  # rate of the others beside which none stands, over the working rate [-]
 GOES_ON = 0.25  # turn times track over the speed of the other side of a rover that goes on [-]
@@ -175,9 +176,11 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, zero = list[Outcome](), evidence.rate == 0.0
     size = np.abs(evidence.rate)
     fast = size > LIVELY * np.nanquantile(size, 0.9, axis=0)
-    count = [np.unique(one).size > FINE for one in evidence.rate.T]  # else counts come and go
-    for column, drives, fine in zip(zero.T, fast.T, count, strict=True):
+    interval = _intervals(evidence.time)
+    for column, rate, drives in zip(zero.T, evidence.rate.T, fast.T, strict=True):
         short = _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
+        step = rate_step(rate, interval)  # of few counts one comes and goes
+        fine = step < FEW_COUNTS * np.nanquantile(np.abs(rate), 0.9)
         column &= short & (len(runs(short)) >= MANY_ZEROS and fine)
     together = zero.all(axis=1)
     if (zero[~together].sum(axis=0) > together.sum()).sum() > 1:
