@@ -751,7 +751,7 @@ class WheelSoilEstimator:
             return None
         rim, unknown = rims.typical, self._reference.unknown_for(time)
         share = -math.expm1(-abs(rim) * unknown / EQUILIBRIUM_LENGTH)
-        return Opinion((1.0 - usual.slip) * rim, (usual.std * rim) ** 2, share)
+        return Opinion((1.0 - usual.slip) * rim, (usual.std * rim) ** 2, share, rim)
 
     # -- Outputs ---------------------------------------------------------------------------------
 
