@@ -140,7 +140,7 @@ def test_pooled_estimates_have_the_moments_of_their_mixture(share):
 def test_a_weaker_soil_takes_more_slip_than_the_tangent_says(sense, slip, std):
     """The slips at which the scaled curve gives the same torque, by root search, at most 1."""
     given = SpeedAndVariance((1.0 - sense * slip) * 0.05, (0.05 * std) ** 2)
-    told = pooled(given, Opinion(*given, 1.0, 0.05))
+    told = pooled(given, Opinion(*given[:2], 1.0, 0.05))
     torque, at_one = (float(torque_of_slip(np.array([s]))[0]) for s in (slip, 1.0))
     slope = (float(torque_of_slip(np.array([slip + 1e-6]))[0]) - torque) / 1e-6
     off = math.exp(min(std * slope / torque, 0.17))
@@ -154,7 +154,7 @@ def test_a_weaker_soil_takes_more_slip_than_the_tangent_says(sense, slip, std):
 
 def test_what_a_reference_has_shown_is_not_doubted_for_the_curve():
     given = SpeedAndVariance(0.025, (0.15 * 0.05) ** 2)
-    kept, lost = (pooled(given, Opinion(*given, share, 0.05)).variance for share in (0.0, 1.0))
+    kept, lost = (pooled(given, Opinion(*given[:2], share, 0.05)).variance for share in (0.0, 1.0))
     assert kept == pytest.approx(given.variance)
     assert lost > 1.5 * given.variance
 

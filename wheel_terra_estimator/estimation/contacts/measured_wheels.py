@@ -59,6 +59,7 @@ class SpeedAndVariance(NamedTuple):
 
     speed: float  # [m/s]
     variance: float
+    widening: float = 1.0  # of the deviation, by the bend of the traction curve [-]
 
 
 class Opinion(NamedTuple):
@@ -83,8 +84,9 @@ def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
     spread = weight * (1.0 - weight) * difference**2
     speed, variance = one.speed + weight * difference, variance + spread
     slip, std = 1.0 - speed / other.rim, math.sqrt(max(variance, 0.0)) / abs(other.rim)
-    by_curve = other.rim * deviation_by_curve(slip, std, other.share * _GREATEST_TORQUE_STD)
-    return SpeedAndVariance(speed, max(variance, by_curve**2))
+    by_curve = deviation_by_curve(slip, std, other.share * _GREATEST_TORQUE_STD)
+    widening = max(by_curve / max(std, _LEAST_STD), 1.0)
+    return SpeedAndVariance(speed, variance * widening**2, widening)
 
 
 def deviation_by_curve(slip: float, std: float, most: float) -> float:
