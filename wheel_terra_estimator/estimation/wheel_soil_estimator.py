@@ -460,10 +460,7 @@ class WheelSoilEstimator:
         length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
         reversion = Reversion()
         if unseen:
-            curve_known = self._curve_known(cycle.time)
-            reversion = speed.reversion(
-                cycle, direction, length, buried=buried, curve_known=curve_known
-            )
+            reversion = speed.reversion(cycle, direction, length, buried=buried)
             expected = reversion.of(by_wheels)
         lacking = speed.learn_bias(self._ekf, cycle, expected, by_wheels)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
