@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from parts import SAND, Parts, on_sand
 
-from wheel_terra_estimator.configuration import reader
+from wheel_terra_estimator.configuration import reader, shipped
 from wheel_terra_estimator.estimation.contacts.cycle import RimSpeeds
+from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
 from wheel_terra_estimator.estimation.filter.speed_process import (
     EQUILIBRIUM_LENGTH,
     SpeedProcess,
@@ -288,7 +289,7 @@ def test_without_a_reference_the_ratio_returns_to_the_usual_one_over_travel():
 
     def after(travel, buried=False):
         cycle = on_sand().cycle([rim] * 6, dt=travel / rim)
-        return made.reversion(cycle, 1.0, length, buried=buried, curve_known=True).of(free)
+        return made.reversion(cycle, 1.0, length, buried=buried).of(free)
 
     assert after(length).speed_gain == pytest.approx(np.exp(-1.0))
     usual = after(1e3 * length).constant
@@ -306,12 +307,26 @@ def test_wheel_rates_without_any_slope_leave_the_slip_class_unknown():
     cycle = Parts(configuration).cycle([rim] * 6, dt=1e4)
     for slope_known in (True, False):
         seen = cycle._replace(loads=cycle.loads._replace(force_known=slope_known))
-        reversion = process([rim] * 6).reversion(
-            seen, 1.0, EQUILIBRIUM_LENGTH, buried=False, curve_known=True
-        )
+        reversion = process([rim] * 6).reversion(seen, 1.0, EQUILIBRIUM_LENGTH, buried=False)
         step = reversion.of(SpeedStep(1.0, 0.0, 0.0, 0.0))
         slip_std = np.sqrt(step.variance) / rim
         assert (slip_std < configuration.filter.class_std) == slope_known
+
+
+def test_without_a_stated_soil_the_usual_slip_is_as_uncertain_as_soils_differ():
+    """Beside the slips of the shipped soils at the pull of a slope."""
+    rover, rim, demand = 'generic_six_wheel', 0.05, 0.15
+    parts = Parts(reader.load([rover]))
+    cycle = parts.cycle([rim] * 6, dt=1e4)
+    cycle = cycle._replace(loads=cycle.loads._replace(force=(demand, 0.0, 1.0)))
+    made = SpeedProcess(parts.configuration, parts.rover, parts.sensors)
+    reversion = made.reversion(cycle, 1.0, EQUILIBRIUM_LENGTH, buried=False)
+    slips = [
+        EquilibriumSlip(reader.load([rover, soil]), parts.rover).at(demand, beyond=0.8)
+        for soil in shipped.files()
+        if soil.startswith('soils/')
+    ]
+    assert np.sqrt(reversion.variance) / rim == pytest.approx(np.std(slips), rel=0.15)
 
 
 def test_wheels_alone_say_nothing_of_the_accelerometers_zero():

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from parts import Parts, on_sand
+from scipy.optimize import brentq
 
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.contacts.equilibrium_slip import EquilibriumSlip
@@ -129,9 +130,33 @@ def test_pooled_estimates_have_the_moments_of_their_mixture(share):
     rng = np.random.default_rng(6)
     first = rng.random(400_000) < 1.0 - 0.1 * share
     drawn = np.where(first, rng.normal(0.2, 0.1, first.size), rng.normal(0.6, 0.3, first.size))
-    told = pooled(SpeedAndVariance(0.2, 0.01), Opinion(0.6, 0.09, share))
+    told = pooled(SpeedAndVariance(0.2, 0.01), Opinion(0.6, 0.09, share, 0.2))
     assert told.speed == pytest.approx(drawn.mean(), rel=0.01)
     assert told.variance == pytest.approx(drawn.var(), rel=0.01)
+
+
+@pytest.mark.parametrize('sense', [1.0, -1.0])
+@pytest.mark.parametrize(('slip', 'std'), [(0.05, 0.06), (0.25, 0.05), (0.4, 0.13), (0.5, 0.15)])
+def test_a_weaker_soil_takes_more_slip_than_the_tangent_says(sense, slip, std):
+    """The slips at which the scaled curve gives the same torque, by root search, at most 1."""
+    given = SpeedAndVariance((1.0 - sense * slip) * 0.05, (0.05 * std) ** 2)
+    told = pooled(given, Opinion(*given[:2], 1.0, 0.05))
+    torque, at_one = (float(torque_of_slip(np.array([s]))[0]) for s in (slip, 1.0))
+    slope = (float(torque_of_slip(np.array([slip + 1e-6]))[0]) - torque) / 1e-6
+    off = math.exp(min(std * slope / torque, 0.17))
+    low, high = (
+        brentq(lambda s, t=t: float(torque_of_slip(np.array([s]))[0]) - t, 0.0, 1.0)
+        for t in (torque / off, min(torque * off, at_one))
+    )
+    assert math.sqrt(told.variance) / 0.05 == pytest.approx(max(0.5 * (high - low), std), rel=0.01)
+    assert (math.sqrt(told.variance) > 1.1 * 0.05 * std) == (std > 0.1)
+
+
+def test_what_a_reference_has_shown_is_not_doubted_for_the_curve():
+    given = SpeedAndVariance(0.025, (0.15 * 0.05) ** 2)
+    kept, lost = (pooled(given, Opinion(*given[:2], share, 0.05)).variance for share in (0.0, 1.0))
+    assert kept == pytest.approx(given.variance)
+    assert lost > 1.5 * given.variance
 
 
 # -- Pull left over: the top of the curve less what the ground asks --------------------------------

@@ -460,10 +460,7 @@ class WheelSoilEstimator:
         length = HELD_LENGTH if held and not buried else EQUILIBRIUM_LENGTH
         reversion = Reversion()
         if unseen:
-            curve_known = self._curve_known(cycle.time)
-            reversion = speed.reversion(
-                cycle, direction, length, buried=buried, curve_known=curve_known
-            )
+            reversion = speed.reversion(cycle, direction, length, buried=buried)
             expected = reversion.of(by_wheels)
         lacking = speed.learn_bias(self._ekf, cycle, expected, by_wheels)
         by_wheels = by_wheels._replace(variance=by_wheels.variance + lacking)
@@ -594,7 +591,7 @@ class WheelSoilEstimator:
             RoverMotion(
                 present.speed,
                 self._reference.fresh(time),
-                self._wheel_motions(rims, slips, drive_sign),
+                self._wheel_motions(rims, slips, drive_sign, present.widening),
                 turning=motion.lateral_motion > _SHARP_TURN
                 or sides_oppose(rims, body.headings.by_yaw_rate),
                 depth_read=self._depth_read(time),
@@ -615,11 +612,12 @@ class WheelSoilEstimator:
             self._buffer.mark(self._instant(time, body), Gaussian(ekf.x, ekf.P))
 
     def _wheel_motions(
-        self, rims: Floats, slips: tuple[WheelSlip, ...], drive_sign: float
+        self, rims: Floats, slips: tuple[WheelSlip, ...], drive_sign: float, widening: float
     ) -> tuple[WheelMotion, ...]:
         """Return what the stuck warning needs of each wheel.
 
-        The sign of `drive_sign` is the direction in which a locked wheel is driven or dragged.
+        The sign of `drive_sign` is the direction in which a locked wheel is driven or dragged. A
+        slip that may be far greater is no less a warning: its deviation is without `widening`.
         """
         rover, torques = self._rover, self._wheels.state.torque
         sinkage = self._ekf.x[self._layout.sinkage].tolist()
@@ -629,7 +627,7 @@ class WheelSoilEstimator:
             motions.append(
                 WheelMotion(
                     wheel.slip,
-                    wheel.std,
+                    wheel.std / widening,
                     rim,
                     turns and not wheel.resting,
                     driving_share(torques[i], rover.torque_limit[i], rim if turns else drive_sign),
@@ -708,7 +706,7 @@ class WheelSoilEstimator:
         """Return what a smoother needs to recompute the outputs of a stamp."""
         ekf, nothing = self._ekf, np.empty(0)
         rims = self._yaw_compensated(self._wheels.rim_speeds(time))
-        speed, variance = self._filtered_speed(rims)
+        speed, variance, _ = self._filtered_speed(rims)
         sources = self._sources()._replace(
             mean=nothing, covariance=nothing, speed=speed, speed_variance=variance
         )
@@ -751,7 +749,7 @@ class WheelSoilEstimator:
             return None
         rim, unknown = rims.typical, self._reference.unknown_for(time)
         share = -math.expm1(-abs(rim) * unknown / EQUILIBRIUM_LENGTH)
-        return Opinion((1.0 - usual.slip) * rim, (usual.std * rim) ** 2, share)
+        return Opinion((1.0 - usual.slip) * rim, (usual.std * rim) ** 2, share, rim)
 
     # -- Outputs ---------------------------------------------------------------------------------
 
@@ -777,7 +775,7 @@ class WheelSoilEstimator:
         """Return the quantities from which the outputs of the present stamp are computed."""
         time, loads = self._clock.time, self._loads.state
         rims = self._wheels.rim_speeds(time)
-        speed, variance = self._clock.speed or self._present_speed(rims)
+        speed, variance, _ = self._clock.speed or self._present_speed(rims)
         return Sources(
             stamp=self._clock.stamp,
             mean=self._ekf.x,

@@ -59,6 +59,7 @@ class SpeedAndVariance(NamedTuple):
 
     speed: float  # [m/s]
     variance: float
+    widening: float = 1.0  # of the deviation, by the bend of the traction curve [-]
 
 
 class Opinion(NamedTuple):
@@ -67,6 +68,7 @@ class Opinion(NamedTuple):
     speed: float  # [m/s]
     variance: float
     share: float  # of the weight by its inverse variance that it has in a pool [-]
+    rim: float  # typical rim speed, not 0 [m/s]
 
 
 def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
@@ -80,4 +82,24 @@ def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
     weight = other.share * one.variance / (one.variance + other.variance)
     variance = (1.0 - weight) * one.variance + weight * other.variance
     spread = weight * (1.0 - weight) * difference**2
-    return SpeedAndVariance(one.speed + weight * difference, variance + spread)
+    speed, variance = one.speed + weight * difference, variance + spread
+    slip, std = 1.0 - speed / other.rim, math.sqrt(max(variance, 0.0)) / abs(other.rim)
+    by_curve = deviation_by_curve(slip, std, other.share * _GREATEST_TORQUE_STD)
+    widening = max(by_curve / max(std, _LEAST_STD), 1.0)
+    return SpeedAndVariance(speed, variance * widening**2, widening)
+
+
+def deviation_by_curve(slip: float, std: float, most: float) -> float:
+    """Return half of the distance of the slips at the same torque on stronger and weaker soil [-].
+
+    The greatest torque is off by as much as explains `std` at the tangent of the curve, `most` at
+    the most [ln]. Weaker soil takes far more slip than the tangent says, up to 1.
+    """
+    mobilised = -math.expm1(-max(abs(slip), _LEAST_STD) / _SLIP_SCALE)
+    relative = min(std * (1.0 - mobilised) / (_SLIP_SCALE * mobilised), most)
+    at_one = -math.expm1(-1.0 / _SLIP_SCALE)
+    low, high = (
+        -_SLIP_SCALE * math.log(1.0 - min(mobilised * math.exp(change), at_one))
+        for change in (-relative, relative)
+    )
+    return 0.5 * (high - low)

@@ -165,6 +165,7 @@ class SpeedProcess(Component[SpeedState]):
     def __init__(self, configuration: Configuration, rover: Rover, sensors: SensorFigures) -> None:
         self._walk = float(configuration.filter.ratio_walk)
         self._gate = float(configuration.filter.gate)
+        self._soil_stated = configuration.soil_stated
         unknown = RimSpeeds((NAN,) * rover.wheel_count, NAN, NAN)
         super().__init__(
             SpeedState(
@@ -404,14 +405,13 @@ class SpeedProcess(Component[SpeedState]):
         return max(spread(changes) - self._rim_noise, 0.0)
 
     def reversion(
-        self, cycle: Cycle, direction: float, length: float, *, buried: bool, curve_known: bool
+        self, cycle: Cycle, direction: float, length: float, *, buried: bool
     ) -> Reversion:
         """Without a reference velocity, revert v / rim speed to the equilibrium slip of the slope.
 
         On deep or saturated contacts torque and pull hardly change with slip. There slip
         is unobservable and a random walk diverges; mean reversion (Ornstein-Uhlenbeck) bounds it.
-        `length` is its length in rim travel [m]; `buried` wheels revert to the greatest slip;
-        `curve_known`: a stated soil or torques give the slip of a pull.
+        `length` is its length in rim travel [m]; `buried` wheels revert to the greatest slip.
         """
         rim, demand = cycle.yaw_compensated.typical, direction * cycle.loads.slope_share
         if not abs(rim) >= self._rover.low_rim:
@@ -420,8 +420,8 @@ class SpeedProcess(Component[SpeedState]):
         slip = most if buried else self._equilibrium_slip.at(demand, beyond=most)
         ratio = 1.0 - clipped(slip, _LEAST_EQUILIBRIUM_SLIP, most)
         keep = math.exp(-abs(rim) * cycle.dt / length)
-        # On an unknown slope or traction curve no more is known than before the drive.
-        known_slip = curve_known and cycle.loads.force_known
+        # On an unknown slope or soil no more is known than before the drive.
+        known_slip = self._soil_stated and cycle.loads.force_known
         std = _EQUILIBRIUM_SLIP_STD if known_slip else _FIRST_RATIO_STD
         return Reversion(keep, (1.0 - keep) * ratio * rim, (1.0 - keep * keep) * (std * rim) ** 2)
 

@@ -199,7 +199,7 @@ class _SmoothedOutputs:
         carried = max(given.speed_variance - instant.cycle.variance, 0.0)
         variance = float(now.covariance[SPEED, SPEED]) + carried
         if instant.by_torque is not None:
-            speed, variance = pooled(SpeedAndVariance(speed, variance), instant.by_torque)
+            speed, variance, _ = pooled(SpeedAndVariance(speed, variance), instant.by_torque)
         rims = known(given.rims)
         typical = sum(map(abs, rims)) / len(given.rims)
         least = max(typical * LEAST_SLIP_STD, _LEAST_STD_SHARE * instant.motion.speed_std)
