@@ -136,14 +136,16 @@ def test_pooled_estimates_have_the_moments_of_their_mixture(share):
 
 
 @pytest.mark.parametrize('sense', [1.0, -1.0])
-@pytest.mark.parametrize(('slip', 'std'), [(0.05, 0.06), (0.25, 0.05), (0.4, 0.13), (0.5, 0.15)])
+@pytest.mark.parametrize(
+    ('slip', 'std'), [(0.0, 0.06), (0.05, 0.06), (0.25, 0.05), (0.4, 0.13), (0.5, 0.15)]
+)
 def test_a_weaker_soil_takes_more_slip_than_the_tangent_says(sense, slip, std):
     """The slips at which the scaled curve gives the same torque, by root search, at most 1."""
     given = SpeedAndVariance((1.0 - sense * slip) * 0.05, (0.05 * std) ** 2)
     told = pooled(given, Opinion(*given[:2], 1.0, 0.05))
     torque, at_one = (float(torque_of_slip(np.array([s]))[0]) for s in (slip, 1.0))
     slope = (float(torque_of_slip(np.array([slip + 1e-6]))[0]) - torque) / 1e-6
-    off = math.exp(min(std * slope / torque, 0.17))
+    off = math.exp(min(std * slope / max(torque, 1e-9), 0.17))
     low, high = (
         brentq(lambda s, t=t: float(torque_of_slip(np.array([s]))[0]) - t, 0.0, 1.0)
         for t in (torque / off, min(torque * off, at_one))

@@ -14,6 +14,7 @@ from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.filter.state import SPEED
+from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     LeavingAngleReading,
@@ -160,6 +161,23 @@ def test_the_slip_that_is_usual_at_a_torque_tells_the_speed_where_no_reference_d
     usual, rim = told('no_reference')
     assert 0.5 * rim < usual.speed < rim  # up 8 degrees it slips
     assert 0.0 < usual.variance < (0.5 * rim) ** 2
+
+
+def test_the_warning_sees_the_deviation_of_the_slip_without_the_bend_of_the_curve(
+    climb, monkeypatch
+):
+    seen, update = [], StuckMonitor.update
+
+    def noted(monitor, time, motion):
+        seen.append([wheel.slip_std for wheel in motion.wheels])
+        return update(monitor, time, motion)
+
+    monkeypatch.setattr(StuckMonitor, 'update', noted)
+    start = replace(climb, arrivals=climb.arrivals[: len(climb.arrivals) // 4])
+    for mode, least, most in (('no_reference', 1.5, 4.0), ('reference', 1.0, 1.0)):
+        published = estimate(start, mode)[-1].slip_std
+        widened = published / seen[-1]
+        assert least <= widened.min() and widened.max() <= most
 
 
 def test_snapshot_comes_back_to_the_bit(climb):
