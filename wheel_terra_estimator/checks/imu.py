@@ -306,7 +306,10 @@ def gross_tilt(evidence: Evidence) -> FloatArray | None:
         up = nearest
     if up[2] == -1.0:
         return np.diag([1.0, -1.0, -1.0])  # about x: about y the slope would turn round as well
-    return np.asarray(Rotation.align_vectors([0.0, 0.0, 1.0], up)[0].as_matrix())
+    axis = np.cross(up, [0.0, 0.0, 1.0])
+    sine = float(np.linalg.norm(axis))
+    turn = math.atan2(sine, float(up[2])) * axis / max(sine, 1e-9)
+    return np.asarray(Rotation.from_rotvec(turn).as_matrix())
 
 
 def gyro_bias(evidence: Evidence) -> tuple[FloatArray, FloatArray, FloatArray] | None:
