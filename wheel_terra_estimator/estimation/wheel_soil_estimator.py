@@ -318,11 +318,11 @@ class WheelSoilEstimator:
         unread = self._sinkage.unread(time)
         # The pull of a soil that nobody states gives no slip; against the wheels it is the same at
         # any speed.
-        known = cycle.reference_known or self._curve_known(time)
+        shown = cycle.reference_known or self._curve_known(time)
         believed = self._reference.contradiction(time) <= 1.0
         opposed = cycle.yaw_compensated.oppose(float(ekf.x[SPEED]))
         considered = layout.considered(
-            forces_show_speed=known and believed and self._contact_age.settled and not opposed,
+            forces_show_speed=shown and believed and self._contact_age.settled and not opposed,
             unread=unread,
             blurred=forces is not None and forces.blurred,
         )

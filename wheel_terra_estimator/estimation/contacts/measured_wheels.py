@@ -59,7 +59,7 @@ class SpeedAndVariance(NamedTuple):
 
     speed: float  # [m/s]
     variance: float
-    widening: float = 1.0  # of the deviation, by the bend of the traction curve [-]
+    widening: float = 1.0  # of its deviation by the bend of the traction curve [-]
 
 
 class Opinion(NamedTuple):
@@ -76,7 +76,8 @@ def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
 
     Mean and variance of the mixture of both, weighted by their inverse variances. Consistent
     however strongly their errors are correlated: with the whole weight its variance is never below
-    that of covariance intersection, and grows with the square of their difference.
+    that of covariance intersection, and grows with the square of their difference. It is widened
+    where the curve bends.
     """
     difference = other.speed - one.speed
     weight = other.share * one.variance / (one.variance + other.variance)
@@ -84,12 +85,12 @@ def pooled(one: SpeedAndVariance, other: Opinion) -> SpeedAndVariance:
     spread = weight * (1.0 - weight) * difference**2
     speed, variance = one.speed + weight * difference, variance + spread
     slip, std = 1.0 - speed / other.rim, math.sqrt(max(variance, 0.0)) / abs(other.rim)
-    by_curve = deviation_by_curve(slip, std, other.share * _GREATEST_TORQUE_STD)
+    by_curve = _deviation_by_curve(slip, std, other.share * _GREATEST_TORQUE_STD)
     widening = max(by_curve / max(std, _LEAST_STD), 1.0)
     return SpeedAndVariance(speed, variance * widening**2, widening)
 
 
-def deviation_by_curve(slip: float, std: float, most: float) -> float:
+def _deviation_by_curve(slip: float, std: float, most: float) -> float:
     """Return half of the distance of the slips at the same torque on stronger and weaker soil [-].
 
     The greatest torque is off by as much as explains `std` at the tangent of the curve, `most` at
