@@ -17,6 +17,7 @@ from wheel_terra_estimator.checks.evidence import (
     Evidence,
     Mask,
     noise_of,
+    once,
     row_medians,
 )
 from wheel_terra_estimator.checks.finding import Outcome, not_checked
@@ -221,6 +222,7 @@ def check_frame(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     return [evidence.found('reference_turned', 0.5, value=angle, angle=angle)], mended
 
 
+@once
 def in_another_frame(evidence: Evidence) -> bool:
     """Return whether there is a reference, and not along x of the rover."""
     there, reference = _beside_rims(evidence), evidence.recording.reference

@@ -371,7 +371,7 @@ def check_signs(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes: list[Outcome] = []
     chosen = _chosen(evidence)
     signs, turn, mended = chosen.signs, chosen.track, evidence
-    if turn < 0.0 and np.ptp(np.cumsum(evidence.yaw)) * evidence.period < HOLDS_HEADING:
+    if turn < 0.0 and np.ptp(integrated(evidence.time, evidence.yaw)) < HOLDS_HEADING:
         turn = 0.0  # wheels may counter what the soil turns the rover by
     if chosen.exchanged:
         finding, mended = _exchanged(evidence, chosen)
