@@ -13,6 +13,7 @@ from parts import SAND, drive, step_inputs
 from wheel_terra_estimator.configuration import reader
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
+from wheel_terra_estimator.estimation.filter.ekf import GatedFilter
 from wheel_terra_estimator.estimation.filter.state import SPEED
 from wheel_terra_estimator.estimation.judgement.stuck.monitor import StuckMonitor
 from wheel_terra_estimator.estimation.measurements import (
@@ -561,3 +562,21 @@ def test_forces_that_references_contradict_do_not_move_the_speed(parts, side, ag
         estimator.step(*step_inputs(0.1 * i, rates, torque, speed=speed))
         speeds.append(float(estimator._ekf.x[SPEED]))
     assert (speeds[-11] - speeds[-1] > 0.003) == moves
+
+
+@pytest.mark.parametrize('speed', [0.09, -0.05])
+def test_forces_of_wheels_that_turn_against_the_motion_do_not_tell_its_speed(
+    parts, monkeypatch, speed
+):
+    """Sand slides back under them as fast as it will: the friction is the same."""
+    held, fuse = [], GatedFilter.fuse
+    monkeypatch.setattr(
+        GatedFilter, 'fuse', lambda ekf, rows, kept=(): held.append(kept) or fuse(ekf, rows, kept)
+    )
+    rover, estimator = parts.rover, WheelSoilEstimator(parts.configuration)
+    torque = 0.2 * np.array(parts.cycle().loads.load) * np.array(rover.slip_radius)
+    for i in range(200):
+        rates = 0.1 / np.array(rover.slip_radius)
+        estimator.step(*step_inputs(0.1 * i, rates, torque, speed=None if i % 5 else speed))
+    assert estimator._ekf.x[SPEED] * speed > 0.0
+    assert (SPEED in [entry for kept in held[-5:] for entry in kept]) == (speed < 0.0)
