@@ -375,14 +375,28 @@ def later(name, seconds, stamp=0.0):
         ('reference', 0.0, -1.7e9, 'order', None),  # time since start
         ('imu', 0.0, 0.003 * WHOLE.imu.seconds, 'order', None),  # a clock that drifts
         ('reference', 0.0, 0.003 * WHOLE.reference.seconds, 'order', None),
-        ('imu', *(sign * 0.45 * (WHOLE.imu.seconds > 167.0) for sign in (-1, 1)), '', 0.0),
+        ('imu', *(sign * 0.45 * (WHOLE.imu.seconds > 167.0) for sign in (-1, 1)), 'order', None),
     ],
 )
 def test_stamps_and_ways_that_are_late(name, seconds, stamp, fault, off):
-    """The last steps by half a second between the circles: that is no offset."""
+    """The last steps by half a second between the circles: a clock was set, that is no offset."""
     told = checked(**later(name, seconds, stamp)).findings
     assert [f.fault for f in told] == [fault] * bool(fault)
     assert not off or told[0].value == pytest.approx(off, abs=0.1)
+
+
+@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize(('name', 'every', 'most'), [('reference', 4, 3.0), ('joints', 4, 0.8)])
+def test_delays_that_differ_from_message_to_message_are_no_steps_of_a_clock(
+    name, every, most, seed
+):
+    """The next one waits for those before it."""
+    channel = getattr(WHOLE, name)
+    channel = rows_of(channel, np.arange(0, channel.stamp.size, every))
+    delays = np.random.default_rng(seed).uniform(0.0, most, channel.stamp.size)
+    arrival = np.maximum.accumulate(channel.stamp + np.round(1e9 * delays).astype(np.int64))
+    report = checked(**{name: replace(channel, log_time=arrival)})
+    assert not any('they step' in f.words for f in report.findings)
 
 
 def test_log_time_alone_does_not_tell_a_clock_from_a_slow_way():
@@ -734,6 +748,14 @@ def test_rates_without_a_sign_reverse_no_wheels_of_a_rover_that_turns_backwards_
     assert faults(checked(whole=whole)) == []
     told = faults(checked(whole=whole, joints={'rate': np.abs(whole.joints.rate)}))
     assert told == ['rates_unsigned']
+
+
+def test_noise_of_a_rover_that_stands_in_a_rut_takes_no_sign_off_its_rates():
+    """Where its wheels spin the reference scatters about 0, one reading ahead and one back."""
+    whole = rolling.driven(300.0, ([5, 6], [0.0, 0.3]))
+    velocity, late = whole.reference.velocity.copy(), whole.reference.seconds > 210.0
+    velocity[late, 0] = 0.2 * (-1.0) ** np.arange(late.sum())
+    assert 'rates_unsigned' not in faults(checked(whole=whole, reference={'velocity': velocity}))
 
 
 def test_standstills_hide_no_rates_without_a_sign():

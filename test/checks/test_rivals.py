@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import rolling_rover as rolling
+from scipy.spatial.transform import Rotation
 
 from wheel_terra_estimator.checks import clocks
 from wheel_terra_estimator.checks.finding import not_checked
@@ -129,3 +130,18 @@ def test_a_recording_that_ends_on_a_slope_shows_no_stop_there():
     imu = {name: getattr(whole.imu, name) + 600_000_000 for name in ('stamp', 'log_time')}
     told = {f.fault: f for f in rolling.checked(whole=whole, imu=imu).findings}
     assert told['imu_offset'].value == pytest.approx(0.6, abs=0.1)
+
+
+@pytest.mark.parametrize('scale', [0.8, 1.2])
+@pytest.mark.parametrize('oriented', [False, True])
+def test_one_scale_of_speeds_and_turns_is_that_of_the_reference(scale, oriented):
+    """The gyro is named beside it, and no radius; an orientation says that it is right."""
+    twist = {name: scale * getattr(WHOLE.reference, name) for name in ('velocity', 'yaw_rate')}
+    heading = np.cumsum(WHOLE.imu.rate[:, 2] * np.gradient(WHOLE.imu.seconds))
+    orientation = Rotation.from_rotvec(np.outer(heading, [0.0, 0.0, 1.0])).as_quat()
+    imu = {'orientation': orientation} if oriented else {}
+    told = {f.fault: f for f in rolling.checked(reference=twist, imu=imu).findings}
+    assert set(told) == {'reference_scale', *['gyro_scale'] * (not oriented)}
+    assert told['reference_scale'].value == pytest.approx(1.0 / scale, rel=0.02)
+    assert (told['reference_scale'].confidence > 0.8) == oriented
+    assert oriented or told['gyro_scale'].confidence < 0.5

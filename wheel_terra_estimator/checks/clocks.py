@@ -515,7 +515,7 @@ def check_transport(
                 outcomes.append(found('order', channel.topic, 0.99, how=how))
             mended[name] = channel = one = even
         most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        order, jumps = _order(one, most_back), _steps(channel)
+        order, jumps = _order(one, most_back), _steps(channel, most_back == 1.0)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
         if order:
@@ -638,21 +638,24 @@ def _drift(late: list[float], others: list[list[float]]) -> float:
     return drift if even and min(abs(drift), abs(without)) > LEAST_OFFSET else 0.0
 
 
-def _steps(channel: Channel) -> FloatArray:
+def _steps(channel: Channel, aged: bool) -> FloatArray:
     """Return the steps (k,) before stamps that messages do not arrive by [s]; 0 for none.
 
-    Those behind a small step stay as far off: one message may be late by itself.
+    Those behind a step are all later, or all less late, than those before it: one message may be
+    late by itself. One far back is out of order by itself, unless the channel may be ``aged``.
     """
     stamped = channel.stamp > 0
     step, arrival = (np.diff(at[stamped]) * 1e-9 for at in (channel.stamp, channel.log_time))
-    far = (step < -FAR_BACK) | ((step > FAR_BACK) & (arrival < 0.5 * step))
+    off = step - arrival
+    far = (np.abs(off) > LEAST_OFFSET) & ((step < 0.0) | (arrival < 0.5 * step))
     late = (channel.log_time - channel.stamp)[stamped] * 1e-9
     for row in np.flatnonzero(far) + 1:
-        off = np.median(late[max(row - SEVERAL, 0) : row]) - np.median(late[row : row + SEVERAL])
-        by = late[row - 1] - late[row]
-        far[row - 1] = abs(by) > FAR_BACK or off / by > 0.5
+        before, after = late[max(row - SEVERAL, 0) : row], late[row : row + SEVERAL]
+        stays = before.min() > after.max() or before.max() < after.min()
+        stays &= min(before.size, after.size) == SEVERAL
+        far[row - 1] = stays or (abs(off[row - 1]) > FAR_BACK and not aged)
     steps = np.zeros(stamped.size)
-    steps[np.flatnonzero(stamped)[1:]] = np.where(far, step - arrival, 0.0)
+    steps[np.flatnonzero(stamped)[1:]] = np.where(far, off, 0.0)
     return steps
 
 

@@ -82,13 +82,13 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if there is None:
         return [], evidence
     reference, rim = there
-    forward = reference.velocity[:, 0]
-    if hardly_moves(forward, np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
+    forward = moving_mean(reference.velocity[:, 0], LEAST_ROWS)  # noise of one at rest is no way
+    if hardly_moves(reference.velocity[:, 0], np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
         return [], evidence  # wheels that spin on the spot
     least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
     ahead, back = (forward > least).sum(), (forward < -least).sum()
     both = min(ahead, back) > SELDOM_NEGATIVE * (ahead + back)
-    speed = np.interp(evidence.time, evidence.seconds(reference), moving_mean(forward, LEAST_ROWS))
+    speed = np.interp(evidence.time, evidence.seconds(reference), forward)
     cut = _cut_off(evidence, speed > least, speed < -least)
     share = -forward[forward < -least] / np.maximum(rim[forward < -least], 1e-9)
     unsigned = cut or (_without_sign(rim, forward) and not _slides(evidence, speed < -least, share))
@@ -99,7 +99,7 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
     unknown = (evidence.moving & ~evidence.unturned)[:, None]
     if cut:
-        goes_back = speed < -CLEAR_SPEED * bend_noise(forward)
+        goes_back = speed < -CLEAR_SPEED * bend_noise(reference.velocity[:, 0])
         unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
     rate = np.where(unknown, np.nan, evidence.rate * np.sign(speed)[:, None])
     finding = evidence.found('rates_unsigned', 0.95, other='reference goes')

@@ -38,11 +38,18 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     not_checked,
 )
-from wheel_terra_estimator.checks.reference import CLEAR_SPEED, in_another_frame
+from wheel_terra_estimator.checks.reference import (
+    CLEAR_SPEED,
+    LEAST_SLIP,
+    WITHOUT_SLIP,
+    in_another_frame,
+    speed_ratios,
+)
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
     LEAST_FALL,
+    Estimate,
     Trial,
     bend_noise,
     block_fit,
@@ -649,6 +656,7 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         'orientation': _heading(evidence, imu),
         'twist.angular': _heading_of_reference(evidence),
     }
+    oriented = False  # as the gyro turns
     for name, other in headings.items():
         if other is None:
             continue
@@ -662,19 +670,50 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         cure, both = block_fit(np.column_stack([gyro, one]), seen)[0], np.column_stack([seen, one])
         parts = [fit[0].value for fit in block_fits(both, np.column_stack([aside, across, gyro]))]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
-        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            details = {'times': 1.0 / cure.value, 'against': name}
-            finding = evidence.found('gyro_scale', 0.9, value=cure.value, std=cure.std, **details)
-            times = np.array([1.0, 1.0, cure.value])
-            if not 0.5 < cure.value < 2.0:  # another unit, of all axes
-                times[:] = cure.value
-            if abs(cure.value / DEGREE - 1.0) < NEAR_DEGREES:
-                how = f'turning by {name}'
-                finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
-                times[:] = DEGREE
-            evidence = evidence.with_channel('imu', rate=imu.rate * times)
-            return [finding], replace(evidence, gyro=evidence.gyro * times)
+        if abs(off) <= max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
+            oriented |= name == 'orientation'
+            continue
+        twist, mended = list[Outcome](), evidence
+        if name == 'twist.angular':
+            twist, mended = _scaled_twist(evidence, cure, 0.9 if oriented else 0.8)
+        if oriented:
+            return twist, mended
+        details = {'times': 1.0 / cure.value, 'against': name}
+        sure = 0.2 if twist else 0.9
+        finding = evidence.found('gyro_scale', sure, value=cure.value, std=cure.std, **details)
+        times = np.array([1.0, 1.0, cure.value])
+        if not 0.5 < cure.value < 2.0:  # another unit, of all axes
+            times[:] = cure.value
+        if abs(cure.value / DEGREE - 1.0) < NEAR_DEGREES:
+            how = f'turning by {name}'
+            finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
+            times[:] = DEGREE
+        if not twist:
+            mended = evidence.with_channel('imu', rate=imu.rate * times)
+            mended = replace(mended, gyro=evidence.gyro * times)
+        return [*twist, finding], mended
     return [], evidence
+
+
+def _scaled_twist(
+    evidence: Evidence, scale: Estimate, sure: float
+) -> tuple[list[Outcome], Evidence]:
+    """Return a reference whose speeds are off the rims by the scale of its turns, and it mended."""
+    reference, ratios = evidence.recording.reference, speed_ratios(evidence)
+    ratio = 1.0 if ratios is None else float(np.quantile(ratios, LEAST_SLIP))
+    by_one = abs(ratio / scale.value - 1.0) < WITHOUT_SLIP < abs(ratio - 1.0)
+    if reference is None or not by_one:
+        return [], evidence
+    words = {'value': 1.0 / scale.value, 'std': scale.std / scale.value**2}
+    details: dict[str, Any] = {'ratio': ratio, 'off': scale.std, 'trial': ''}
+    details['alternative'] = f', its turns {scale.value:.3f} times those of the gyro'
+    finding = evidence.found('reference_scale', sure, **words, **details)
+    twist = {
+        'velocity': reference.velocity / scale.value,
+        'yaw_rate': reference.yaw_rate / scale.value,
+        'variance': reference.variance / scale.value**2,
+    }
+    return [finding], evidence.with_channel('reference', **twist)
 
 
 def sides_exchanged(facts: RoverFacts) -> list[int]:
