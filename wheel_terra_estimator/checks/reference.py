@@ -272,6 +272,13 @@ def speed_ratios(evidence: Evidence) -> FloatArray | None:
     return np.asarray(speed[rows] / rim[rows])
 
 
+def as_fast_as_rims(evidence: Evidence, scale: float) -> bool:
+    """Return whether a reference goes as many times as fast as the rims, and not as they do."""
+    ratios = speed_ratios(evidence)
+    ratio = 1.0 if ratios is None else float(np.quantile(ratios, LEAST_SLIP))
+    return abs(ratio / scale - 1.0) < WITHOUT_SLIP < abs(ratio - 1.0)
+
+
 def check_reference_unit(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     """Return the units that a reference may be in, and the evidence mended where it is one."""
     there = _beside_rims(evidence)

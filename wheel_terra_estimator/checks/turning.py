@@ -40,16 +40,13 @@ from wheel_terra_estimator.checks.finding import (
 )
 from wheel_terra_estimator.checks.reference import (
     CLEAR_SPEED,
-    LEAST_SLIP,
-    WITHOUT_SLIP,
+    as_fast_as_rims,
     in_another_frame,
-    speed_ratios,
 )
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
     LEAST_FALL,
-    Estimate,
     Trial,
     bend_noise,
     block_fit,
@@ -89,6 +86,7 @@ SOME = ', or some of them do: drive straight'
 ALL_WHEELS = ', or all wheels read negative'
 SPINS = ', or the rover spins on the spot and hardly turns: drive straight'
 DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
+BESIDE_TWIST = 0.2  # probability of a scale of the gyro that speeds have as well [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
@@ -656,7 +654,6 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         'orientation': _heading(evidence, imu),
         'twist.angular': _heading_of_reference(evidence),
     }
-    oriented = False  # as the gyro turns
     for name, other in headings.items():
         if other is None:
             continue
@@ -671,15 +668,10 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         parts = [fit[0].value for fit in block_fits(both, np.column_stack([aside, across, gyro]))]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
         if abs(off) <= max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            oriented |= name == 'orientation'
             continue
-        twist, mended = list[Outcome](), evidence
-        if name == 'twist.angular':
-            twist, mended = _scaled_twist(evidence, cure, 0.9 if oriented else 0.8)
-        if oriented:
-            return twist, mended
         details = {'times': 1.0 / cure.value, 'against': name}
-        sure = 0.2 if twist else 0.9
+        of_twist = name != 'orientation' and as_fast_as_rims(evidence, cure.value)
+        sure = BESIDE_TWIST if of_twist else 0.9
         finding = evidence.found('gyro_scale', sure, value=cure.value, std=cure.std, **details)
         times = np.array([1.0, 1.0, cure.value])
         if not 0.5 < cure.value < 2.0:  # another unit, of all axes
@@ -688,32 +680,11 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
             how = f'turning by {name}'
             finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
             times[:] = DEGREE
-        if not twist:
-            mended = evidence.with_channel('imu', rate=imu.rate * times)
-            mended = replace(mended, gyro=evidence.gyro * times)
-        return [*twist, finding], mended
+        if of_twist:
+            return [finding], evidence
+        evidence = evidence.with_channel('imu', rate=imu.rate * times)
+        return [finding], replace(evidence, gyro=evidence.gyro * times)
     return [], evidence
-
-
-def _scaled_twist(
-    evidence: Evidence, scale: Estimate, sure: float
-) -> tuple[list[Outcome], Evidence]:
-    """Return a reference whose speeds are off the rims by the scale of its turns, and it mended."""
-    reference, ratios = evidence.recording.reference, speed_ratios(evidence)
-    ratio = 1.0 if ratios is None else float(np.quantile(ratios, LEAST_SLIP))
-    by_one = abs(ratio / scale.value - 1.0) < WITHOUT_SLIP < abs(ratio - 1.0)
-    if reference is None or not by_one:
-        return [], evidence
-    words = {'value': 1.0 / scale.value, 'std': scale.std / scale.value**2}
-    details: dict[str, Any] = {'ratio': ratio, 'off': scale.std, 'trial': ''}
-    details['alternative'] = f', its turns {scale.value:.3f} times those of the gyro'
-    finding = evidence.found('reference_scale', sure, **words, **details)
-    twist = {
-        'velocity': reference.velocity / scale.value,
-        'yaw_rate': reference.yaw_rate / scale.value,
-        'variance': reference.variance / scale.value**2,
-    }
-    return [finding], evidence.with_channel('reference', **twist)
 
 
 def sides_exchanged(facts: RoverFacts) -> list[int]:
