@@ -255,14 +255,9 @@ class Evidence:
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
     def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
-        """Return means of (k,) values within `AROUND` of stamps [ns]; nan for none."""
-        at = (stamp - self.origin) * 1e-9
-        first = np.searchsorted(self.time, at - AROUND)
-        last = np.searchsorted(self.time, at + AROUND, side='right')
-        total = np.concatenate([[0.0], np.cumsum(values)])
-        return np.where(
-            last > first, (total[last] - total[first]) / np.maximum(last - first, 1), np.nan
-        )
+        """Return means of (k,) values within `AROUND` of stamps [ns]."""
+        at = np.asarray((stamp - self.origin) * 1e-9 + AROUND, dtype=np.float64)
+        return averaged(self.time, values[:, None], at, 2.0 * AROUND)[:, 0]
 
     def rows(self, kept: Mask) -> Evidence:
         """Return the evidence with some messages of the wheel odometry."""
@@ -276,7 +271,7 @@ class Evidence:
         """Return means of (k, 3) values over the time from one of some rows to the next."""
         if values is None:
             return None
-        spans = _since_the_row_before(self.time)
+        spans = since_the_row_before(self.time)
         total = np.cumsum(np.column_stack([values, np.ones(spans.size)]) * spans[:, None], axis=0)
         table = np.diff(total[kept], axis=0, prepend=0.0)
         return table[:, :-1] / table[:, -1:]
@@ -338,7 +333,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
     imu = recording.imu
     if imu is not None:
         at = (imu.stamp - rows.stamp[0]) * 1e-9
-        width = _since_the_row_before(time)
+        width = since_the_row_before(time)
         force, gyro = (
             averaged(at, np.nan_to_num(values) @ facts.mounting.T, time, width) - bias
             if np.isfinite(values).any()
@@ -353,7 +348,7 @@ def gather(recording: Recording, facts: RoverFacts, figures: dict[str, Any]) -> 
     )
 
 
-def _since_the_row_before(time: FloatArray) -> FloatArray:
+def since_the_row_before(time: FloatArray) -> FloatArray:
     """Return the time since the row before [s]; no more than a reading stands, usual at first."""
     step = np.diff(time)
     return np.minimum(np.append(np.median(step), step), LONGEST_HELD * 1e-9)

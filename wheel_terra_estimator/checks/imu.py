@@ -180,9 +180,7 @@ def _placeholders(imu: ImuSeries) -> Judged:
         ('force', 'linear_acceleration', 'gravity', 'slope and load'),
         ('rate', 'angular_velocity', 'sign', 'turns'),
     ):
-        if not _has(imu, name) and name not in imu.absent:
-            outcomes.append(found('imu_nan', imu.topic, 0.99, share=100.0, field=field))
-        elif not _has(imu, name):
+        if not _has(imu, name):
             outcomes.append(not_checked(of, f'{name}_missing', field=field, tells=tells))
         elif not np.nan_to_num(getattr(imu, name)).any():
             outcomes.append(found('force_zero', imu.topic, 0.999, field=field))

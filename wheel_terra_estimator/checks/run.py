@@ -248,8 +248,8 @@ def _whole_rows(recording: Recording) -> tuple[list[Outcome], Recording]:
         both = np.hstack([imu.force, imu.rate])
         known = np.isfinite(both)
         there = np.asarray(known.any(axis=0))
-        measured = np.repeat([there[:3].any(), there[3:].any()], 3)  # or said not to be there
-        lost = np.where(measured, 1.0 - known.mean(axis=0), 0.0)
+        absent = np.repeat([name in imu.absent for name in ('force', 'rate')], 3)
+        lost = np.where(absent, 0.0, 1.0 - known.mean(axis=0))
         if lost.max() > LEAST_LOST:
             field = 'linear_acceleration' if lost[:3].max() > lost[3:].max() else 'angular_velocity'
             share = 100.0 * float(lost.max())

@@ -19,6 +19,7 @@ from wheel_terra_estimator.checks.evidence import (
     Mask,
     noise_of,
     row_medians,
+    since_the_row_before,
 )
 from wheel_terra_estimator.checks.finding import RATE_UNITS, Outcome, listed, not_checked
 from wheel_terra_estimator.checks.reference import (
@@ -176,7 +177,7 @@ def check_zeros(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     outcomes, zero = list[Outcome](), evidence.rate == 0.0
     size = np.abs(evidence.rate)
     fast = size > LIVELY * np.nanquantile(size, 0.9, axis=0)
-    interval = _intervals(evidence.time)
+    interval = since_the_row_before(evidence.time)
     for column, rate, drives in zip(zero.T, evidence.rate.T, fast.T, strict=True):
         short = _sudden(column, drives, evidence.time, SHORT_ZERO + evidence.period)
         step = rate_step(rate, interval)  # of few counts one comes and goes
@@ -408,7 +409,7 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     if not facts.known or rows.sum() < 60:
         return []
     stated = float(facts.sensors.wheel_rate_std)
-    interval, noise, by_steps = _intervals(evidence.time)[rows], [], []
+    interval, noise, by_steps = since_the_row_before(evidence.time)[rows], [], []
     for rate in evidence.rate.T:
         bend = np.diff(rate, 2)[rows[1:-1]] / math.sqrt(6.0)
         bend = bend[np.isfinite(bend)]
@@ -437,11 +438,6 @@ def check_noise(evidence: Evidence) -> list[Outcome]:
     return [evidence.found(key, 0.95, wheel=wheel, value=float(f'{seen:.2g}'), **details)]
 
 
-def _intervals(time: FloatArray) -> FloatArray:
-    """Return the time since the row before [s], usual at the first."""
-    return np.diff(time, prepend=2.0 * time[0] - time[1]) if time.size > 1 else np.ones(time.size)
-
-
 def rounding(evidence: Evidence) -> float:
     """Return by how much the mean of the rates may be off, over the working rate [-].
 
@@ -453,7 +449,7 @@ def rounding(evidence: Evidence) -> float:
     change = change[np.isfinite(change)]
     if evidence.working_rate <= 0.0 or not change.size or np.mean(change == 0.0) < KEPT:
         return 0.0
-    step = np.median([rate_step(column, _intervals(time)) for column in rate.T])
+    step = np.median([rate_step(column, since_the_row_before(time)) for column in rate.T])
     return 0.5 * float(step) / evidence.working_rate
 
 
