@@ -514,8 +514,8 @@ def check_transport(
                 how = f'they come in bursts, stamped up to {wait:.2g} s late when they are read'
                 outcomes.append(found('order', channel.topic, 0.99, how=how))
             mended[name] = channel = one = even
-        most_back = BACKWARD_SHARE if name in ('joints', 'imu') else 1.0  # others are fused late
-        order, jumps = _order(one, most_back), _steps(channel, most_back == 1.0)
+        aged = name not in ('joints', 'imu')  # these are fused late
+        order, jumps = _order(one, aged), _steps(channel, aged)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order
         if order:
@@ -659,7 +659,7 @@ def _steps(channel: Channel, aged: bool) -> FloatArray:
     return steps
 
 
-def _order(channel: Channel, most_back: float) -> list[Outcome]:
+def _order(channel: Channel, aged: bool) -> list[Outcome]:
     stamped = channel.stamp > 0
     zero = float(np.mean(~stamped))
     step = np.diff(channel.stamp[stamped]) * 1e-9
@@ -670,7 +670,7 @@ def _order(channel: Channel, most_back: float) -> list[Outcome]:
     words = []
     if zero > 0.01:
         words.append(f'{100 * zero:.0f} % of the stamps are 0 or negative')
-    if back > most_back:
+    if back > BACKWARD_SHARE and not aged:
         words.append(
             f'{100 * back:.1f} % of the stamps go back, by up to {-min(step.min(), 0.0):.2g} s'
         )
