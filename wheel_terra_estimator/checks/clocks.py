@@ -641,8 +641,8 @@ def _drift(late: list[float], others: list[list[float]]) -> float:
 def _steps(channel: Channel, aged: bool) -> FloatArray:
     """Return the steps (k,) before stamps that messages do not arrive by [s]; 0 for none.
 
-    Those behind a step are all later, or all less late, than those before it: one message may be
-    late by itself. One far back is out of order by itself, unless the channel may be ``aged``.
+    Those behind a step are all later than those before it, or all less late; one far back is out of
+    order by itself, unless the channel may be ``aged``.
     """
     stamped = channel.stamp > 0
     step, arrival = (np.diff(at[stamped]) * 1e-9 for at in (channel.stamp, channel.log_time))
@@ -650,12 +650,12 @@ def _steps(channel: Channel, aged: bool) -> FloatArray:
     far = (np.abs(off) > LEAST_OFFSET) & ((step < 0.0) | (arrival < 0.5 * step))
     late = (channel.log_time - channel.stamp)[stamped] * 1e-9
     for row in np.flatnonzero(far) + 1:
-        before, after = late[max(row - SEVERAL, 0) : row], late[row : row + SEVERAL]
+        before, after = late[:row][-SEVERAL:], late[row:][:SEVERAL]
         stays = before.min() > after.max() or before.max() < after.min()
         stays &= min(before.size, after.size) == SEVERAL
         far[row - 1] = stays or (abs(off[row - 1]) > FAR_BACK and not aged)
     steps = np.zeros(stamped.size)
-    steps[np.flatnonzero(stamped)[1:]] = np.where(far, off, 0.0)
+    steps[np.flatnonzero(stamped)[1:]] = far * off
     return steps
 
 

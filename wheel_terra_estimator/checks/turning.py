@@ -38,11 +38,7 @@ from wheel_terra_estimator.checks.finding import (
     listed,
     not_checked,
 )
-from wheel_terra_estimator.checks.reference import (
-    CLEAR_SPEED,
-    as_fast_as_rims,
-    in_another_frame,
-)
+from wheel_terra_estimator.checks.reference import CLEAR_SPEED, as_fast_as_rims, in_another_frame
 from wheel_terra_estimator.checks.rover_facts import RoverFacts, side_of
 from wheel_terra_estimator.checks.series import ImuSeries
 from wheel_terra_estimator.checks.statistics import (
@@ -86,7 +82,6 @@ SOME = ', or some of them do: drive straight'
 ALL_WHEELS = ', or all wheels read negative'
 SPINS = ', or the rover spins on the spot and hardly turns: drive straight'
 DEGREE, NEAR_DEGREES = math.radians(1.0), 0.15  # [rad]; error of a scale that few turns tell [-]
-BESIDE_TWIST = 0.2  # probability of a scale of the gyro that speeds have as well [-]
 SAME_TURNS, LEAST_SCALE, SCALE_SIGMAS = 0.97, 0.05, 4.0  # correlation, error [-]
 IN_DEGREES_BY_WHEELS = (14.3, 250.0)  # gyro over wheels, which skid, if in degrees/s [-]
 HEADING_TIME = 3.0  # turns by orientation and gyro are compared over this [s]
@@ -667,23 +662,19 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         cure, both = block_fit(np.column_stack([gyro, one]), seen)[0], np.column_stack([seen, one])
         parts = [fit[0].value for fit in block_fits(both, np.column_stack([aside, across, gyro]))]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
-        if abs(off) <= max(LEAST_SCALE, SCALE_SIGMAS * cure.std):
-            continue
-        details = {'times': 1.0 / cure.value, 'against': name}
         of_twist = name != 'orientation' and as_fast_as_rims(evidence, cure.value)
-        sure = BESIDE_TWIST if of_twist else 0.9
-        finding = evidence.found('gyro_scale', sure, value=cure.value, std=cure.std, **details)
-        times = np.array([1.0, 1.0, cure.value])
-        if not 0.5 < cure.value < 2.0:  # another unit, of all axes
-            times[:] = cure.value
-        if abs(cure.value / DEGREE - 1.0) < NEAR_DEGREES:
-            how = f'turning by {name}'
-            finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
-            times[:] = DEGREE
-        if of_twist:
-            return [finding], evidence
-        evidence = evidence.with_channel('imu', rate=imu.rate * times)
-        return [finding], replace(evidence, gyro=evidence.gyro * times)
+        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std) and not of_twist:
+            details = {'times': 1.0 / cure.value, 'against': name}
+            finding = evidence.found('gyro_scale', 0.9, value=cure.value, std=cure.std, **details)
+            times = np.array([1.0, 1.0, cure.value])
+            if not 0.5 < cure.value < 2.0:  # another unit, of all axes
+                times[:] = cure.value
+            if abs(cure.value / DEGREE - 1.0) < NEAR_DEGREES:
+                how = f'turning by {name}'
+                finding = evidence.found('gyro_degrees', 0.95, value=DEGREE, **details, how=how)
+                times[:] = DEGREE
+            evidence = evidence.with_channel('imu', rate=imu.rate * times)
+            return [finding], replace(evidence, gyro=evidence.gyro * times)
     return [], evidence
 
 
