@@ -138,3 +138,12 @@ def test_one_scale_of_speeds_and_turns_is_that_of_the_reference(scale):
     (told,) = rolling.found(reference=twist)
     assert told.fault == 'reference_scale' and told.confidence > 0.9
     assert told.value == pytest.approx(1.0 / scale, rel=0.02)
+
+
+@pytest.mark.parametrize(('deeper', 'said'), [(0.0, 'hardly any'), (0.03, 'looks like depth')])
+def test_one_zero_of_all_sinkages_is_said_to_look_like_depth(deeper, said):
+    sinkage = {'sinkage': 0.3 * WHOLE.sinkage.sinkage + deeper}
+    report = rolling.checked(sinkage=sinkage)
+    assert not [f for f in report.findings if f.fault.startswith('sinkage')]
+    told = {n.reason for n in report.not_checked if n.kind in ('sign', 'zero')}
+    assert any(said in reason for reason in told)

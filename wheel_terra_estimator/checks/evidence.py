@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from wheel_terra_estimator.arrays import BoolArray, FloatArray, IntArray
+from wheel_terra_estimator.arrays import BoolArray, FloatArray
 from wheel_terra_estimator.checks.finding import FAULTS, Finding, found
 from wheel_terra_estimator.checks.rover_facts import RoverFacts
 from wheel_terra_estimator.checks.series import (
@@ -86,14 +86,9 @@ class Evidence:
         assert self.recording.joints is not None
         return self.recording.joints
 
-    @property
-    def origin(self) -> int:
-        """Stamp of time 0 [ns]."""
-        return int(self.joints.stamp[0])
-
     def seconds(self, channel: Channel) -> FloatArray:
-        """Return stamps of a channel since time 0 [s]."""
-        return np.asarray((channel.stamp - self.origin) * 1e-9, dtype=np.float64)
+        """Return stamps of a channel since that of the first row [s]."""
+        return np.asarray((channel.stamp - self.joints.stamp[0]) * 1e-9, dtype=np.float64)
 
     @cached_property
     def period(self) -> float:
@@ -254,9 +249,9 @@ class Evidence:
         rate = np.abs(self.gyro[:, 2])
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
-    def rim_at(self, stamp: IntArray, values: FloatArray) -> FloatArray:
-        """Return means of (k,) values within `AROUND` of stamps [ns]."""
-        at = np.asarray((stamp - self.origin) * 1e-9 + AROUND, dtype=np.float64)
+    def rim_at(self, channel: Channel, values: FloatArray) -> FloatArray:
+        """Return means of (k,) values within `AROUND` of the stamps of a channel."""
+        at = self.seconds(channel) + AROUND
         return averaged(self.time, values[:, None], at, 2.0 * AROUND)[:, 0]
 
     def rows(self, kept: Mask) -> Evidence:

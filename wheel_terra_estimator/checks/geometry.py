@@ -87,7 +87,7 @@ class _Speeds(NamedTuple):
         """Return values of the wheel odometry there, positive along the drive."""
         reference = evidence.recording.reference
         assert reference is not None
-        means = evidence.rim_at(reference.stamp, np.nan_to_num(values))
+        means = evidence.rim_at(reference, np.nan_to_num(values))
         return means[self.rows] * np.sign(self.rim)
 
     @property
@@ -101,10 +101,10 @@ def _straight_speeds(evidence: Evidence) -> _Speeds | None:
     reference = evidence.recording.reference
     if reference is None:
         return None
-    rows = evidence.rim_at(reference.stamp, evidence.straight.astype(float)) > 0.99
+    rows = evidence.rim_at(reference, evidence.straight.astype(float)) > 0.99
     if rows.sum() < LEAST_REFERENCES:
         return None
-    rim = evidence.rim_at(reference.stamp, evidence.rim)
+    rim = evidence.rim_at(reference, evidence.rim)
     return _Speeds(rim[rows], reference.velocity[rows, 0], rows)
 
 
@@ -231,7 +231,7 @@ def _depth(evidence: Evidence) -> Estimate:
     series, facts = evidence.recording.sinkage, evidence.facts
     if series is None:
         return FIRM_DEPTH
-    straight = evidence.rim_at(series.stamp, evidence.straight.astype(float)) > 0.99
+    straight = evidence.rim_at(series, evidence.straight.astype(float)) > 0.99
     _, rows = without_stated_errors(facts, series)
     known = rows[straight][np.isfinite(rows[straight])]
     if known.size < LEAST_DEPTHS or not np.ptp(known):

@@ -73,7 +73,7 @@ def _beside_rims(evidence: Evidence) -> tuple[VelocitySeries, FloatArray] | None
     reference = evidence.recording.reference
     if reference is None or reference.stamp.size < LEAST_REFERENCES:
         return None
-    return reference, np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    return reference, np.nan_to_num(evidence.rim_at(reference, evidence.rim))
 
 
 def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
@@ -257,10 +257,10 @@ def speed_ratios(evidence: Evidence) -> FloatArray | None:
     reference = evidence.recording.reference
     if reference is None:
         return None
-    rim = np.abs(evidence.rim_at(reference.stamp, row_medians(evidence.speed)))
+    rim = np.abs(evidence.rim_at(reference, row_medians(evidence.speed)))
     usual = float(np.nanquantile(rim, 0.9)) if np.isfinite(rim).any() else 0.0
     least = AHEAD * evidence.working_rate * float(np.nanmean(evidence.facts.radius))
-    mean = np.abs(evidence.rim_at(reference.stamp, evidence.rim))
+    mean = np.abs(evidence.rim_at(reference, evidence.rim))
     rows = (rim > max(0.4 * usual, least, 1e-9)) & (mean > MOSTLY * rim)
     speed = np.linalg.norm(reference.velocity[:, :2], axis=1)
     if rows.sum() < LEAST_ROWS:
@@ -347,7 +347,7 @@ def check_covariance(evidence: Evidence) -> list[Outcome]:
     forward = reference.velocity[:, 0]
     if reference.stamp.size < LEAST_REFERENCES or not np.ptp(forward):
         return []  # no reading of a speed
-    rim = np.nan_to_num(evidence.rim_at(reference.stamp, evidence.rim))
+    rim = np.nan_to_num(evidence.rim_at(reference, evidence.rim))
     if evidence.facts.known and np.quantile(np.abs(forward), 0.8) > BEYOND * np.abs(rim).max():
         return []  # in another unit
     noise = min(bend_noise(forward), bend_noise(forward - rim))  # wheels start and stop as well

@@ -121,9 +121,9 @@ def _sign_and_zero(
             how = f'median sinkage {1000 * usual:.0f} mm: the wheels would float'
             return [_zero(evidence, names, usual, DEEP_STD * small, how)]
         return [evidence.found('sinkage_sign', 0.5, value=-1.0, reading=1000 * usual)]
-    outcomes: list[Outcome] = []
-    if np.nanmedian(np.abs(middle)) < limit:
-        outcomes.append(not_checked('sign', 'sinkage_shallow'))
+    shallow = np.nanmedian(np.abs(middle)) < limit
+    unseen = ('sign', 'sinkage_shallow') if shallow else ('zero', 'sinkage_deep')
+    outcomes: list[Outcome] = [not_checked(*unseen)]
     facts = evidence.facts
     across = {a: facts.names[i] for a, i in zip(facts.names, sides_exchanged(facts), strict=True)}
     for index, name in enumerate(names):

@@ -496,7 +496,7 @@ def _direction(evidence: Evidence, signs: FloatArray) -> _Agreement:
     speed = row_medians(np.nan_to_num(evidence.rate) * signs)
     reference, by_reference, by_force = evidence.recording.reference, None, None
     if reference is not None and not in_another_frame(evidence):
-        sense = np.sign(np.nan_to_num(evidence.rim_at(reference.stamp, speed)))
+        sense = np.sign(np.nan_to_num(evidence.rim_at(reference, speed)))
         forward = np.nan_to_num(reference.velocity[:, 0])  # the faster, the more it tells
         most = 2.0 * float(np.median(np.abs(forward[sense != 0.0]))) if sense.any() else 0.0
         forward = np.clip(forward, -most, most)  # but for jumps
