@@ -250,9 +250,10 @@ class Evidence:
         return _shared(self.moving & (rate > 0.3 * np.quantile(rate, 0.98)))
 
     def rim_at(self, channel: Channel, values: FloatArray) -> FloatArray:
-        """Return means of (k,) values within `AROUND` of the stamps of a channel."""
+        """Return means of (k,) values within `AROUND` of stamps of a channel; nan far from any."""
         at = self.seconds(channel) + AROUND
-        return averaged(self.time, values[:, None], at, 2.0 * AROUND)[:, 0]
+        mean = averaged(self.time, values[:, None], at, 2.0 * AROUND)[:, 0]
+        return np.where(beside(channel, self.joints), mean, np.nan)
 
     def rows(self, kept: Mask) -> Evidence:
         """Return the evidence with some messages of the wheel odometry."""
