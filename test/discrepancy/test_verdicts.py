@@ -160,6 +160,50 @@ def test_beds_that_differ_from_sweep_to_sweep_are_no_effect(unproposed, options)
     assert said.startswith('that the beds differ')
 
 
+BY_SLIP = Options(effects=('slip_sinkage_exponent', 'stress_peak_shift'))
+
+
+def rising(hidden=(), drift=0.0):
+    """Return rows that were taken at rising slips, on soil that softens from row to row."""
+    table, values, soil, rows = make('sweep40', hidden)
+    order = np.argsort(rows['slip'], kind='stable')
+    place = np.argsort(order)
+    table = on_patches(table, soil, rows, place, np.exp(-drift * np.linspace(-0.5, 0.5, 40)))
+    return {key: column[order] for key, column in table.items()}, values
+
+
+def test_soil_that_drifts_while_slip_rises_is_no_effect_of_slip(unproposed):
+    table, values = rising(drift=0.5)
+    found = run(table, values, options=BY_SLIP)
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert 'only if the soil drifts from row to row' in found.sentence
+    assert any('differ from the first row to the last' in note for note in found.notes)
+    assert found.next_measurement[0].what == 'the first rows again, after the last'
+    # Taken in this order, whatever the order in the file; and no drift in that of the file.
+    mixed = np.random.default_rng(3).permutation(40)
+    again = {key: column[mixed] for key, column in {**table, 'row_order': np.arange(40.0)}.items()}
+    assert run(again, values, options=BY_SLIP).verdict == 'agrees'
+    del again['row_order']
+    assert run(again, values, options=BY_SLIP).verdict == 'unexplained'
+
+
+def test_an_effect_of_slip_is_told_from_a_drift_while_slip_rises():
+    table, values = rising(('slip_sinkage_exponent',))
+    (named,) = run(table, values, options=BY_SLIP).effects
+    backwards = {key: column[::-1] for key, column in table.items()}
+    mixed = {**backwards, 'row_order': np.random.default_rng(3).permutation(40)}
+    (unordered,) = run(mixed, values, options=BY_SLIP).effects
+    assert named.name == unordered.name == 'slip_sinkage_exponent'
+    assert named.confidence == pytest.approx(unordered.confidence, abs=0.01)
+
+
+def test_beds_that_differ_give_no_name_that_the_rows_do_not_give_without_them():
+    accounted_for = SimpleNamespace(left=SimpleNamespace(accounted_for=True))
+    ours = SimpleNamespace(effects=(), verdict=accounted_for)
+    beside = SimpleNamespace(effects=('soil_mound',), verdict=accounted_for)
+    assert decision.Decision.unless(ours, beside, 0.9, 'drift') is ours
+
+
 def test_soil_that_differs_from_day_to_day_is_no_effect(unproposed):
     table, values, soil, rows = make('sweep40')
     cohesive = soil.cohesion + 700.0

@@ -110,8 +110,8 @@ class Decision:
         Else, or where it has another model than the configured one, the names are less sure, and
         no law is proposed unless beds are improbable.
         """
-        if not apart.verdict.left.accounted_for:
-            return self  # nor do beds
+        if not apart.verdict.left.accounted_for or len(apart.effects) > len(self.effects):
+            return self  # nor do beds, or not by themselves
         ours, theirs = (d.findings.setting.forward.base_effects for d in (self, apart))
         if probability > _LIKELY and ours.keys() == theirs.keys():
             return replace(apart, beds_differ=probability, ground=ground)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wheel_terra_estimator.arrays import FloatArray, IndexArray
+from wheel_terra_estimator.arrays import FloatArray
 from wheel_terra_estimator.configuration.configuration import Configuration, Readings
 from wheel_terra_estimator.discrepancy.decision import Decider, Decision
 from wheel_terra_estimator.discrepancy.fitting.coordinates import (
@@ -37,6 +37,7 @@ from wheel_terra_estimator.discrepancy.tables.checks import (
 )
 from wheel_terra_estimator.discrepancy.tables.steady_table import (
     QUANTITIES,
+    Ground,
     SteadyTable,
     operating_points,
 )
@@ -202,7 +203,7 @@ def _effects_to_try(
 def _beside_beds(
     decision: Decision,
     decider: Decider,
-    grounds: Mapping[str, IndexArray],
+    grounds: Mapping[str, Ground],
     off: Sequence[Findings] = (),  # each without an effect that is on and should not be
 ) -> Decision:
     """Let soil that differs between grounds compete with a decision, whatever is on."""
@@ -227,7 +228,7 @@ def _in_doubt_of_what_is_on(
     forward: Forward,
     effects: Mapping[str, Effect],
     on: Mapping[str, Mapping[str, Effect]],  # each effect that is on -> forms to be tried
-    grounds: Mapping[str, IndexArray],
+    grounds: Mapping[str, Ground],
 ) -> tuple[Decision, tuple[str, ...]]:
     """Let each effect that is on compete with its other forms and with its absence.
 

@@ -77,7 +77,8 @@ BED_SCATTER = {'stiffness': 0.10, 'tan_friction': 0.03}
 # By which a soil differs from day to day, with moisture and density: shares, cohesion in Pa;
 # assumed, published loams of two moistures differ by more.
 DAY_SCATTER = {'stiffness': 0.30, 'tan_friction': 0.10, 'cohesion': 500.0}
-SCATTER = {'row': BED_SCATTER, 'sweep': BED_SCATTER, 'day': DAY_SCATTER}  # from one to the next
+# From one to the next, and from the first row to the last.
+SCATTER = {'row': BED_SCATTER, 'sweep': BED_SCATTER, 'day': DAY_SCATTER, 'drift': DAY_SCATTER}
 BED = 'bed'  # owner of what the bed of the rows under diagnosis has in excess of a reference's
 _FARTHEST_BED = 8.0  # deviations by which it may differ
 

@@ -278,23 +278,25 @@ def own_beds(
     """Return a remark where the soil may differ (sweeps, days, rows), and what to measure then."""
     if not decision.beds_differ:
         return (), ()
-    usual = percent(SCATTER[decision.ground]['stiffness'])
+    ground, usual = decision.ground, percent(SCATTER[decision.ground]['stiffness'])
     swept = ' and '.join(plain(name) for name in table.varying() if name not in ON_ONE_BED)
     what = {
         'row': 'the drive again beside its ruts',
         'sweep': 'one sweep again on a fresh bed, with a column trial',
         'day': 'a sweep of each day again, all on one day',
-    }[decision.ground]
+        'drift': 'the first rows again, after the last',
+    }[ground]
     together = ''
-    if decision.ground == 'sweep' and not swept:  # trials alone
+    if ground == 'sweep' and not swept:  # trials alone
         what = 'the sweep again on three more fresh beds'
-    elif decision.ground == 'sweep':
+    elif ground == 'sweep':
         together = f'{swept} and bed changed together: '
         if 'trial' in table.columns:
             what = f'the sweeps of least and greatest {swept} again, each on two fresh beds'
+    ends = 'the first row to the last' if ground == 'drift' else f'{ground} to {ground}'
     remark = (
-        f'{together}that the beds differ from {decision.ground} to {decision.ground} ({usual} of '
-        f'the stiffness is usual) is {percent(decision.beds_differ)} likely'
+        f'{together}that the beds differ from {ends} ({usual} of the stiffness is usual) is '
+        f'{percent(decision.beds_differ)} likely'
     )
     competitors = 'another bed', f'an effect of {swept or "slip"}'
     return (remark,), (NextMeasurement(what, competitors, 0.0, math.inf),)
@@ -391,8 +393,9 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
     if not floor:
         within = ' (model-error floor needed: none)'
     if decision.ground:
+        drifts, own = 'the soil drifts from row to row', f'each {decision.ground} had its own bed'
         return (
-            f'Model and measurement agree only if each {decision.ground} had a bed of its own, '
+            f'Model and measurement agree only if {drifts if decision.ground == "drift" else own}, '
             f'once the soil is refitted{within}; else something is missing.'
         )
     return f'Model and measurement agree once the soil is refitted{within}.'

@@ -45,7 +45,7 @@ from wheel_terra_estimator.discrepancy.selection.weights import (
     linear_starts,
     weigh,
 )
-from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, SteadyTable
+from wheel_terra_estimator.discrepancy.tables.steady_table import QUANTITIES, Ground, SteadyTable
 from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 Outliers: TypeAlias = Sequence[tuple[int, int, float]]  # row, quantity, deviation of a cell
@@ -146,11 +146,11 @@ def search(
     )
 
 
-def apart(findings: Findings, grounds: Mapping[str, IndexArray]) -> tuple[str, Findings]:
+def apart(findings: Findings, grounds: Mapping[str, Ground]) -> tuple[str, Findings]:
     """Weigh the best explanations once more, where the soil differs as it usually does.
 
-    ``grounds``: what may have soil of its own -> (N,) number of it of each row, an error that its
-    rows share. Returns which of them fits the soil alone best, and the findings.
+    ``grounds``: what may have soil of its own. Returns which of them fits the soil alone best, and
+    the findings.
     """
     alone, builder = list[tuple[float, str, Setting, Fit]](), copy(findings.builder)
     for name, ground in grounds.items():
@@ -162,11 +162,11 @@ def apart(findings: Findings, grounds: Mapping[str, IndexArray]) -> tuple[str, F
             nothing = setting.refit(nothing)
         alone.append((setting.explain(nothing).log_evidence, name, setting, nothing))
     _, chosen, setting, nothing = max(alone, key=lambda one: one[0])
-    ranked = enumerate(e.fitted for e in findings.selection.explanations)
+    problem, ranked = setting.problem, enumerate(e.fitted for e in findings.selection.explanations)
     best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]
-    fits = setting.fit(
-        [f.names for f in best], [f.u for f in best], np.array([f.angle for f in best])
-    )
+    # Linear in both: only what is reported is fitted again.
+    moved = [(f, problem.residual(f.outputs), problem.rotation @ f.sensitivity) for f in best]
+    fits = (replace(f, residual=left, jacobian=slope) for f, left, slope in moved)
     explanations = [setting.explain(f) for f in (nothing, *fits)]
     selection = weigh(explanations, setting.floors, setting.effects)
     return chosen, replace(findings, setting=setting, nothing=nothing, selection=selection)
@@ -333,7 +333,7 @@ class _Builder:
         self._moved = slope * moved[:, None]
 
     def part_grounds(
-        self, ground: IndexArray, scatter: Mapping[str, float], problem: Problem, nothing: Fit
+        self, ground: Ground, scatter: Mapping[str, float], problem: Problem, nothing: Fit
     ) -> None:
         """Let the soil differ between grounds, linearly around a fit."""
         self.by_ground = []
@@ -341,8 +341,8 @@ class _Builder:
             if c.owner == 'soil' and c.name in scatter:
                 slope = np.zeros(self.table.measured.shape)
                 slope[problem.row, problem.quantity] = column / c.scale
-                std = np.full(len(self.table), scatter[c.name])
-                self.by_ground.append(CommonError(slope, std, ground))
+                std = scatter[c.name] * ground.share
+                self.by_ground.append(CommonError(slope, std, ground.number))
 
     def build(self, std: FloatArray, outliers: Outliers, *, free: bool = False) -> Problem:
         """Return the problem without some cells; ``free``: trials share no structural error."""

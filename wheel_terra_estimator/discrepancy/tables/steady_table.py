@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,13 @@ COLUMNS = (*INPUT_COLUMNS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_CO
 ON_ONE_BED = ('slip', 'pass_number')  # inputs that change within a sweep
 _LEAST_ROWS = 3  # of a sweep, in the mean
 _APART = 0.05  # of the range, between loads (...) of two sweeps
+
+
+class Ground(NamedTuple):
+    """How soil differs between rows: (N,) shares of a deviation common to rows of one number."""
+
+    share: FloatArray
+    number: IndexArray
 
 
 @dataclass(frozen=True)
@@ -83,17 +91,23 @@ class SteadyTable:
         sweep = np.ravel(np.unique(levels, axis=0, return_inverse=True)[1])
         return sweep if 0 < sweep.max() < len(self) / _LEAST_ROWS else None
 
-    def grounds(self) -> dict[str, IndexArray]:
-        """Return what may have soil of its own (row, sweep, day) -> (N,) number of it of each row.
+    def grounds(self) -> dict[str, Ground]:
+        """Return what may have soil of its own: row, sweep, day; or drift, along the rows as taken.
 
         In a drive each wheel rolls in each window on soil of its own.
         """
+        every = np.ones(len(self))
         if self.true_rows.any():
-            return {'row': np.arange(len(self))}
-        dates, sweep = np.nan_to_num(self.columns.get('date', np.zeros(len(self)))), self.sweeps()
+            return {'row': Ground(every, np.arange(len(self)))}
+        dates, sweep = np.nan_to_num(self.columns.get('date', 0.0 * every)), self.sweeps()
         day = np.ravel(np.unique(np.floor(dates), return_inverse=True)[1])
         several = 0 < day.max() < len(self) / _LEAST_ROWS
-        return {**({} if sweep is None else {'sweep': sweep}), **({'day': day} if several else {})}
+        place = np.argsort(np.argsort(self.columns.get('row_order', self.lines), kind='stable'))
+        return {
+            **({} if sweep is None else {'sweep': Ground(every, sweep)}),
+            **({'day': Ground(every, day)} if several else {}),
+            'drift': Ground(place / place.max() - 0.5, np.zeros_like(place)),
+        }
 
     def trials(self) -> FloatArray:
         """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
