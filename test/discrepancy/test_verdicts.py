@@ -187,6 +187,13 @@ def test_soil_that_drifts_while_slip_rises_is_no_effect_of_slip(unproposed):
     assert run(again, values, options=BY_SLIP).verdict == 'unexplained'
 
 
+def test_soil_that_drifts_beside_a_reference_is_no_effect():
+    (table, values), (reference, _) = rising(drift=0.5), rising()
+    found = run(table, values, options=BY_SLIP, reference=check_table('a.csv', reference))
+    assert (found.verdict, found.effects) == ('agrees', ())
+    assert found.sentence.startswith('Rows and reference agree only if the soil drifts')
+
+
 def test_an_effect_of_slip_is_told_from_a_drift_while_slip_rises():
     table, values = rising(('slip_sinkage_exponent',))
     (named,) = run(table, values, options=BY_SLIP).effects

@@ -115,10 +115,13 @@ def diagnose(
     decider = Decider(table, findings, chosen.allowed_error, misread)
     decision = decider.decision()
     notes: tuple[str, ...] = ()
-    if reference is None and not misread:
+    if not misread:
         grounds = table.grounds()
+        if reference is not None:  # beside the bed of each, soil that drifts on it
+            each = np.repeat([0, 1], [len(table), len(reference)])
+            grounds = {'drift': Ground(np.append(table.drift(), reference.drift()), each)}
         decision = _beside_beds(decision, decider, grounds)
-        if decision.verdict.status != 'agrees':
+        if reference is None and decision.verdict.status != 'agrees':
             on = _forms_of_what_is_on(forward, chosen)
             for name, forms in on.items():
                 if len(forms) > 1:

@@ -381,24 +381,22 @@ def _agreement(decision: Decision, gap_p_value: float) -> str:
             f'estimated at {scattered}; state it in *_std columns, or look for what changes from '
             'row to row.'
         )
-    if decision.verdict.left.shared:
-        both = f', but for an error of {number(100 * floor, 2)} % of the range that both have'
-        return f'Rows and reference agree once the soil is refitted{both if floor else ""}.'
-    if floor > _COARSE:
+    error, shared = f'{number(100 * floor, 2)} % of the range', decision.verdict.left.shared
+    if floor > _COARSE and not shared:
         return (
             'These rows are too scattered to judge the model: it agrees with them, but only within '
-            f'{100 * floor:.0f} % of the range (p = {number(gap_p_value, 2)}).'
+            f'{error} (p = {number(gap_p_value, 2)}).'
         )
-    within = f', with a model-error floor of {number(100 * floor, 2)} % of the range'
+    within, who = f', with a model-error floor of {error}', 'Model and measurement'
+    if shared:
+        within, who = f', but for an error of {error} that both have', 'Rows and reference'
     if not floor:
-        within = ' (model-error floor needed: none)'
-    if decision.ground:
-        drifts, own = 'the soil drifts from row to row', f'each {decision.ground} had its own bed'
-        return (
-            f'Model and measurement agree only if {drifts if decision.ground == "drift" else own}, '
-            f'once the soil is refitted{within}; else something is missing.'
-        )
-    return f'Model and measurement agree once the soil is refitted{within}.'
+        within = '' if shared else ' (model-error floor needed: none)'
+    only = f' only if each {decision.ground} had its own bed,' if decision.ground else ''
+    if decision.ground == 'drift':
+        only = ' only if the soil drifts from row to row,'
+    rest = '; else something is missing' if only else ''
+    return f'{who} agree{only} once the soil is refitted{within}{rest}.'
 
 
 def sentence(

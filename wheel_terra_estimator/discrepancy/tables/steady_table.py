@@ -102,12 +102,16 @@ class SteadyTable:
         dates, sweep = np.nan_to_num(self.columns.get('date', 0.0 * every)), self.sweeps()
         day = np.ravel(np.unique(np.floor(dates), return_inverse=True)[1])
         several = 0 < day.max() < len(self) / _LEAST_ROWS
-        place = np.argsort(np.argsort(self.columns.get('row_order', self.lines), kind='stable'))
         return {
             **({} if sweep is None else {'sweep': Ground(every, sweep)}),
             **({'day': Ground(every, day)} if several else {}),
-            'drift': Ground(place / place.max() - 0.5, np.zeros_like(place)),
+            'drift': Ground(self.drift(), np.zeros(len(self), dtype=np.intp)),
         }
+
+    def drift(self) -> FloatArray:
+        """(N,) from -0.5 in the row that was taken first to 0.5 in the last."""
+        place = np.argsort(np.argsort(self.columns.get('row_order', self.lines), kind='stable'))
+        return place / (len(self) - 1) - 0.5
 
     def trials(self) -> FloatArray:
         """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
