@@ -149,13 +149,14 @@ def rows_from_measurements(
     if smoother is not None:
         series = replace(series, smoothed=smoother.speed())
     finder = _WindowFinder(series, configuration)
-    windows = _with_deviations(finder.search(), configuration)
-    if not windows:
+    found = finder.search()
+    if not found:
         seen = ', '.join(f'{key} {finder.seconds[key]:.1f} s' for key in finder.seconds)
         raise UserError(
             f'{name}: no steady window of {LEAST_DURATION:g} s and {LEAST_PASSAGES} lug passages '
             f'({seen or "nothing"}); drive straight at constant wheel rate, a few seconds per slope'
         )
+    windows = _with_deviations(found, configuration)
     columns, left_out = _columns(windows, configuration)
     _add_shared_errors(columns, configuration, len(windows))
     return DriveRows(
@@ -386,8 +387,6 @@ def pooled_correlation(blocks: Iterable[FloatArray]) -> float:
 
 def _with_deviations(windows: list[Window], configuration: Configuration) -> list[Window]:
     """Return the windows with the standard deviations of their means."""
-    if not windows:
-        return []
     settings, sensors = Rover.from_configuration(configuration), configuration.sensors
     names = ('slip', 'torque', 'sinkage', 'pull')
     correlation = {name: pooled_correlation(w.series[name] for w in windows) for name in names}

@@ -136,16 +136,24 @@ def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tup
     It comes from the signatures at the base fit. An effect's second parameter (an onset, a
     depth) has no gradient while its strength is nil, so a few values of it compete.
     """
-    trials: list[Trial] = []
-    for name in names:
-        own = effect_coordinates(setting.effects[name])
-        for shape in shapes(own, setting.deepest, 0.0):
-            trials.append((name, own, shape))
+    trials = [
+        (name, own, shape)
+        for name in names
+        for own in (effect_coordinates(setting.effects[name]),)
+        for shape in shapes(own, setting.deepest, 0.0)
+    ]
     if not trials:
         return []
-    problem, responses = setting.problem, _strength_responses(setting, base, trials)
-    best: dict[str, tuple[float, Start]] = {}
-    for (name, own, shape), (outputs, column) in zip(trials, responses, strict=True):
+    state = setting.forward.solve(
+        [(*base.coordinates, *own) for _, own, _ in trials],
+        [np.concatenate([base.u, shape]) for _, _, shape in trials],
+        base.angle,
+        by=[[len(base.u)]] * len(trials),
+    )
+    problem, best = setting.problem, dict[str, tuple[float, Start]]()
+    for (name, own, shape), outputs, column in zip(
+        trials, state.outputs, state.jacobian, strict=True
+    ):
         # By the strength only: the shape has no gradient here.
         jacobian = problem.rotation @ np.concatenate(
             [base.sensitivity, problem.flat(column)], axis=1
@@ -171,34 +179,6 @@ def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tup
         if name not in best or score > best[name][0]:
             best[name] = score, ((*base.names, name), full, base.angle)
     return list(best.values())
-
-
-Trial = tuple[str, tuple[Coordinate, ...], FloatArray]
-"""Name, its coordinates, and the values at which it starts."""
-
-
-def _strength_responses(
-    setting: Setting, base: Fit, trials: Sequence[Trial]
-) -> list[tuple[FloatArray, FloatArray]]:
-    """Return outputs (N, 4) and their derivative (N, 4, 1) by strength of each.
-
-    Terms of a sparse law have only a strength: all are in one model.
-    """
-    fixed = len(base.u)
-    if all(setting.effects[name].sparse for name, _, _ in trials):
-        together = (*base.coordinates, *(own[0] for _, own, _ in trials))
-        starts = np.concatenate([base.u, *(shape for _, _, shape in trials)])
-        by = [range(fixed, len(together))]
-        state = setting.forward.solve([together], [starts], base.angle[None], by=by)
-        jacobian = state.jacobian[0]
-        return [(state.outputs[0], jacobian[..., k : k + 1]) for k in range(len(trials))]
-    state = setting.forward.solve(
-        [(*base.coordinates, *own) for _, own, _ in trials],
-        [np.concatenate([base.u, shape]) for _, _, shape in trials],
-        base.angle,
-        by=[[fixed]] * len(trials),
-    )
-    return list(zip(state.outputs, state.jacobian, strict=True))
 
 
 # Prior probabilities: nothing missing, one effect, two effects.
