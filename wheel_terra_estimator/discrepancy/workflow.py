@@ -47,7 +47,6 @@ from wheel_terra_estimator.terramechanics.effects.base import Effect, effect_of
 
 _UNLIKELY = 0.05  # odds of different beds below which they are not reported
 _WRONGLY_ON = 0.05  # prior probability of an effect that is on and should not be; assumed
-_BEDS_DIFFER = 0.2  # prior probability, where rows may be on several; assumed
 
 
 @dataclass(frozen=True)
@@ -118,8 +117,7 @@ def diagnose(
     if not misread:
         grounds = table.grounds()
         if reference is not None:  # beside the bed of each, soil that drifts on it
-            each = np.repeat([0, 1], [len(table), len(reference)])
-            grounds = {'drift': Ground(np.append(table.drift(), reference.drift()), each)}
+            grounds = {'drift': table.drift(reference)}
         decision = _beside_beds(decision, decider, grounds)
         if reference is None and decision.verdict.status != 'agrees':
             on = _forms_of_what_is_on(forward, chosen)
@@ -217,10 +215,10 @@ def _beside_beds(
     parted = [apart(findings, grounds) for findings in found]
     alike = max(w + f.selection.totals[0] for w, f in zip(weights, found, strict=True))
     differing = [w + f.selection.totals[0] for w, (_, f) in zip(weights, parted, strict=True)]
-    odds = math.exp(min(max(differing) - alike, MOST_ODDS)) * _BEDS_DIFFER / (1.0 - _BEDS_DIFFER)
+    ground, findings = parted[int(np.argmax(differing))]
+    odds = math.exp(min(max(differing) - alike, MOST_ODDS)) * grounds[ground].odds
     if odds <= _UNLIKELY:
         return decision
-    ground, findings = parted[int(np.argmax(differing))]
     other = replace(decider, findings=findings, beds_differ=True, laws={}).decision()
     return decision.unless(other, odds / (1.0 + odds), ground)
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -160,7 +161,8 @@ def apart(findings: Findings, grounds: Mapping[str, Ground]) -> tuple[str, Findi
             problem = builder.build(findings.noise.std, findings.outliers)
             setting = replace(setting, problem=problem)
             nothing = setting.refit(nothing)
-        alone.append((setting.explain(nothing).log_evidence, name, setting, nothing))
+        likely = setting.explain(nothing).log_evidence + math.log(ground.odds)
+        alone.append((likely, name, setting, nothing))
     _, chosen, setting, nothing = max(alone, key=lambda one: one[0])
     problem, ranked = setting.problem, enumerate(e.fitted for e in findings.selection.explanations)
     best = [f for place, f in ranked if len(f.names) == 1 or (f.names and place < _KEPT)]

@@ -29,6 +29,7 @@ ORDER_COLUMNS = ('row_order', 'trial', 'date', 'direction')
 COLUMNS = (*INPUT_COLUMNS, *QUANTITIES, 'leaving_angle', *STD_COLUMNS, *ORDER_COLUMNS)
 ON_ONE_BED = ('slip', 'pass_number')  # inputs that change within a sweep
 _LEAST_ROWS = 3  # of a sweep, in the mean
+_DRIFTS = 0.05  # odds beforehand that soil drifts while a table is taken; assumed, as an effect's
 _APART = 0.05  # of the range, between loads (...) of two sweeps
 
 
@@ -37,6 +38,7 @@ class Ground(NamedTuple):
 
     share: FloatArray
     number: IndexArray
+    odds: float = 0.25  # that soil differs so, beforehand; assumed
 
 
 @dataclass(frozen=True)
@@ -105,13 +107,15 @@ class SteadyTable:
         return {
             **({} if sweep is None else {'sweep': Ground(every, sweep)}),
             **({'day': Ground(every, day)} if several else {}),
-            'drift': Ground(self.drift(), np.zeros(len(self), dtype=np.intp)),
+            'drift': self.drift(),
         }
 
-    def drift(self) -> FloatArray:
-        """(N,) from -0.5 in the row that was taken first to 0.5 in the last."""
-        place = np.argsort(np.argsort(self.columns.get('row_order', self.lines), kind='stable'))
-        return place / (len(self) - 1) - 0.5
+    def drift(self, reference: SteadyTable | None = None) -> Ground:
+        """Return soil that drifts from row to row, as they were taken; of each table by itself."""
+        parts = [self] if reference is None else [self, reference]
+        ranks = [part.columns.get('row_order', part.lines).argsort().argsort() for part in parts]
+        share = np.concatenate([rank / rank.max() - 0.5 for rank in ranks])
+        return Ground(share, np.repeat(np.arange(len(parts)), list(map(len, parts))), _DRIFTS)
 
     def trials(self) -> FloatArray:
         """(N,) number of the trial of each row: each has a bed of its own; all 0 if not stated."""
