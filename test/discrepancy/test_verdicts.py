@@ -204,6 +204,15 @@ def test_an_effect_of_slip_is_told_from_a_drift_while_slip_rises():
     assert named.confidence == pytest.approx(unordered.confidence, abs=0.01)
 
 
+def test_a_drift_is_no_more_frequent_than_an_effect():
+    """At the odds of beds it would be told beside this weak one."""
+    table, values, _, rows = make('basic16', ('stress_peak_shift',), 0.3)
+    order = np.argsort(rows['slip'], kind='stable')
+    found = run({key: column[order] for key, column in table.items()}, values, options=BY_SLIP)
+    assert [effect.name for effect in found.effects] == ['stress_peak_shift']
+    assert not any('first row to the last' in note for note in found.notes)
+
+
 def test_beds_that_differ_give_no_name_that_the_rows_do_not_give_without_them():
     accounted_for = SimpleNamespace(left=SimpleNamespace(accounted_for=True))
     ours = SimpleNamespace(effects=(), verdict=accounted_for)

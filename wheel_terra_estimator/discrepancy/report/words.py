@@ -205,14 +205,11 @@ def _leaves(left: Remainder) -> str:
 
 def _undecided(gap: Mapping[str, QuantityGap], nearest: tuple[str, ...]) -> str:
     """Return what is off, by how much, and which effects come nearest."""
-    parts = []
-    for name in channels_off(gap):
-        item = gap[name]
-        parts.append(
-            f'{plain(name)} is off by {amount(name, item.after)} {SHOWN[name][1]} on unseen rows '
-            f'(noise and allowed model error permit {amount(name, item.limit)})'
-        )
-    off = ' and '.join(parts)
+    off = ' and '.join(
+        f'{plain(name)} is off by {amount(name, gap[name].after)} {SHOWN[name][1]} on unseen rows '
+        f'(noise and allowed model error permit {amount(name, gap[name].limit)})'
+        for name in channels_off(gap)
+    )
     text = f'Undecided: {off}, but these rows favour neither the refitted soil nor an effect'
     return f'{text}; nearest: {", ".join(nearest)}.' if nearest else f'{text}.'
 
