@@ -13,7 +13,7 @@ from wheel_terra_estimator.configuration.configuration import Configuration
 from wheel_terra_estimator.estimation.contacts.contact_models import contact_models
 from wheel_terra_estimator.estimation.contacts.cycle import Cycle, RimSpeeds
 from wheel_terra_estimator.estimation.contacts.loads import WheelLoads
-from wheel_terra_estimator.estimation.contacts.steering import straight_headings
+from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.filter.initial_state import initial_filter, layout_of
 from wheel_terra_estimator.estimation.inputs.inertial import InertialWindow
 from wheel_terra_estimator.estimation.measurements import (
@@ -43,6 +43,11 @@ def step_inputs(time, rate, torque, force=(0.1, 0.0, 9.8), speed=None):
         inertial=InertialReading(stamp, np.array(force), np.zeros(3), None),
         reference=None if speed is None else ReferenceVelocity(stamp, speed, 1e-6),
     )
+
+
+def straight_headings(rover):
+    """Return the headings of wheels that point straight ahead."""
+    return headings(rover, (0.0,) * rover.wheel_count)
 
 
 @dataclass

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from parts import straight_headings
 from scipy.optimize import minimize_scalar
 
 from wheel_terra_estimator.estimation.contacts.contact_age import (
@@ -26,7 +27,7 @@ from wheel_terra_estimator.estimation.contacts.pulls import (
 )
 from wheel_terra_estimator.estimation.contacts.ruts import Ruts, curvature_of
 from wheel_terra_estimator.estimation.contacts.stationary_wheels import StationaryWheels
-from wheel_terra_estimator.estimation.contacts.steering import headings, straight_headings
+from wheel_terra_estimator.estimation.contacts.steering import headings
 from wheel_terra_estimator.estimation.contacts.turning import Turning, sides_oppose
 from wheel_terra_estimator.estimation.contacts.unloaded_wheels import UnloadedWheels
 from wheel_terra_estimator.estimation.contacts.wheel_models import WheelStates

@@ -9,8 +9,8 @@ import pytest
 from fake_estimator import SECOND, configuration
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from parts import straight_headings
 
-from wheel_terra_estimator.estimation.contacts.steering import straight_headings
 from wheel_terra_estimator.estimation.core import EstimatorCore
 from wheel_terra_estimator.estimation.estimates import SlipClass
 from wheel_terra_estimator.estimation.judgement.classes import (

@@ -28,15 +28,7 @@ class RimSpeeds(NamedTuple):
     @classmethod
     def of(cls, rims: Floats, yaw_rate: float, headings: Headings) -> RimSpeeds:
         """Compensate yaw rate [rad/s] and steering: the body speed that fits each rim speed."""
-        if headings.steered:
-            each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
-        else:  # each rolls along with the body
-            each = tuple(
-                [
-                    rim - by_yaw_rate * yaw_rate
-                    for rim, by_yaw_rate in zip(rims, headings.by_yaw_rate, strict=True)
-                ]
-            )
+        each = tuple([headings.body_speed(i, rim, yaw_rate) for i, rim in enumerate(rims)])
         measured = known(each) or [NAN]
         return cls(each, median(measured), median([abs(rim) for rim in measured]))
 

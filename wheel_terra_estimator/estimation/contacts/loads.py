@@ -56,9 +56,8 @@ class WheelLoads(Component[LoadState]):
         if window.has_force:
             force, rover = self._smoothed(window), self._rover
             moment = [t - f * r for t, f, r in zip(torques, pulls, rover.rim_radius, strict=True)]
-            if headings.steered:
-                moment = [m * c for m, c in zip(moment, headings.along, strict=True)]
-                pulls = tuple([f * c for f, c in zip(pulls, headings.along, strict=True)])
+            moment = [m * c for m, c in zip(moment, headings.along, strict=True)]
+            pulls = tuple([f * c for f, c in zip(pulls, headings.along, strict=True)])
             loads = rover.load.loads(force, pulls, moment).tolist()
             if any(unloaded):
                 total = sum(loads)

@@ -42,8 +42,6 @@ class Headings(NamedTuple):
     across: Floats  # sin d
     side_by_speed: Floats  # of u_i by v [-]
     side_by_yaw_rate: Floats  # of u_i by w [m]
-    steered: bool
-    """False: no wheel of the rover steers."""
 
     def speeds(self, speed: float, yaw_rate: float) -> FloatArray:
         """Return the ground speed of each wheel along its heading, (n,) [m/s]."""
@@ -83,21 +81,6 @@ class Headings(NamedTuple):
         ]
 
 
-def straight_headings(rover: Rover) -> Headings:
-    """Return the headings of a rover none of whose wheels steers."""
-    n = rover.wheel_count
-    middle = sum(rover.longitudinal) / n
-    return Headings(
-        by_speed=(1.0,) * n,
-        by_yaw_rate=tuple([-y for y in rover.lateral]),
-        along=(1.0,) * n,
-        across=(0.0,) * n,
-        side_by_speed=(0.0,) * n,
-        side_by_yaw_rate=tuple([x - middle for x in rover.longitudinal]),
-        steered=False,
-    )
-
-
 def headings(rover: Rover, angles: Sequence[float]) -> Headings:
     """Return the headings of wheels at steering angles [rad], positive left."""
     sine, cosine = [math.sin(a) for a in angles], [math.cos(a) for a in angles]
@@ -114,7 +97,6 @@ def headings(rover: Rover, angles: Sequence[float]) -> Headings:
         across=tuple(sine),
         side_by_speed=tuple([drift * c - s for s, c, _, _ in wheels]),
         side_by_yaw_rate=tuple([(arm + a) * c + b * s for s, c, a, b in wheels]),
-        steered=True,
     )
 
 
@@ -129,7 +111,8 @@ class Steering(Component[SteeringState]):
     """Keeps the newest steering angles; wheels head straight until one was read."""
 
     def __init__(self, rover: Rover) -> None:
-        super().__init__(SteeringState((0.0,) * rover.wheel_count, straight_headings(rover)))
+        straight = (0.0,) * rover.wheel_count
+        super().__init__(SteeringState(straight, headings(rover, straight)))
         self._rover = rover
 
     def update(self, steering: FloatArray) -> None:
@@ -140,5 +123,5 @@ class Steering(Component[SteeringState]):
                 for new, old in zip(steering.tolist(), self.state.angles, strict=True)
             ]
         )
-        if angles != self.state.angles or not self.state.headings.steered:
+        if angles != self.state.angles:
             self.state = SteeringState(angles, headings(self._rover, angles))

@@ -121,10 +121,7 @@ class Turning(Component[TurningState]):
             travel=keep * state.travel + travel,
         )
         turning = fastest_rim > self._rover.low_rim
-        # Greatest lateral speed of a wheel; without steering that of the outermost axle.
-        side = abs(yaw_rate) * self._rover.curvature_length
-        if headings.steered:
-            side = max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
+        side = max(abs(side) for side in headings.side_speeds(speed, yaw_rate))
         motion = min(side / fastest_rim, 1.0) if turning else 0.0
         self.state = state = state._replace(lateral_motion=motion)
         return state

@@ -92,10 +92,7 @@ class ForceBalance(Component['float | None']):
         the shear model [-]; the errors of `repeats` cycles are one and the same (same ground).
         """
         headings, loads = cycle.headings, cycle.loads.load
-        if headings.steered:
-            jacobian = np.array(headings.along) @ forces.pull_rows
-        else:
-            jacobian = forces.pull_rows.sum(axis=0)
+        jacobian = np.array(headings.along) @ forces.pull_rows
         pull_sum = added_variance = 0.0
         for i, (load, standing) in enumerate(zip(loads, stationary, strict=True)):
             along, side = headings.along[i], headings.across[i] * _SIDE_SHARE * load
