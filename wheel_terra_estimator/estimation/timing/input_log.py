@@ -31,10 +31,6 @@ from wheel_terra_estimator.estimation.timing.step_grid import LONGEST_STEP, Step
 
 KEPT_STATE_SPACING = 50_000_000
 """Least time between kept states [ns]: keeping one costs a twentieth of a step."""
-DENSE_SPAN = 100_000_000
-"""After an input that is late by less than this [ns] all states of the last steps are kept."""
-DENSE_DURATION = 2_000_000_000
-"""Time for which that goes on after the last such input [ns of stamps]."""
 TRIM_LENGTH = 64
 """Entries that are no longer needed are removed once there are so many."""
 
@@ -131,7 +127,6 @@ class InputLog:
         self._progress = _Progress(0, -1, 0, None, 0)
         self._account()
         self._last_kept = 0  # stamp of the newest kept state
-        self._dense_until = 0
 
     def retune(self, runners: Sequence[Stepped], settings: TimeSettings) -> None:
         """Continue from the state after the last step with other runners and times."""
@@ -169,8 +164,6 @@ class InputLog:
             self._dirty += self.added_steps(stamp)
             self._last_run = last_run._replace(unchanged=index)
         if changed and index < self._ran:
-            if stamp > stamps[self._ran - 1] - DENSE_SPAN:
-                self._dense_until = stamps[self._ran - 1] + DENSE_DURATION
             self._ran = index
         return index, new
 
@@ -214,17 +207,12 @@ class InputLog:
         """Make all whole steps up to the entry `last`; return what is left over of the next."""
         if self._position != self._ran or self._position < 0 or self._provisional:
             self._go_back()
-        entries = self.entries
-        dense = entries[last].stamp < self._dense_until
-        dense_from = entries[last].stamp - DENSE_SPAN
         pending: list[list[Any]] = []
         for index in range(self._position, last + 1):
-            entry = entries[index]
+            entry = self.entries[index]
             entry.kept = None
             after = self._extend_step(entry, pending)
             if after is not None:
-                if dense and entry.stamp >= dense_from:
-                    self._keep(always=True)  # what is late by little comes between these
                 self._step(entry.stamp, pending, after)
                 pending.clear()
                 self._position = self._ran = index + 1
