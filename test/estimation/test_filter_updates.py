@@ -392,11 +392,11 @@ def test_the_first_reading_of_a_wheel_that_dug_in_is_believed(parts, ekf, sinkag
     ) == pytest.approx(0.11, abs=0.001)
 
 
-def sinkage_predicted(parts, x, loads=None, angle=NAN, angle_std=0.0, rims=FORWARD):
+def sinkage_predicted(parts, x, loads=None, angle=NAN, rims=FORWARD):
     """Return the prediction over a tenth of a second, and the travel."""
     prediction = Prediction.unchanged(x)
     cycle = parts.cycle(rims, loads, leaving_angles=np.full(6, angle))
-    process = SinkageProcess(parts.rover, parts.layout, parts.models, angle_std)
+    process = SinkageProcess(parts.rover, parts.layout, parts.models)
     return prediction, process.predict(prediction, x, cycle)
 
 
@@ -413,7 +413,7 @@ def relaxed(parts, ekf, seconds, speed=0.05, start=None):
 
 def test_digging_leaves_the_sinkage_open_until_it_is_read_or_the_wheel_rolls_on(parts, ekf):
     """Sand that a standing wheel spins out is gone: 0 to 0.1 of the way that the rim slips."""
-    process = SinkageProcess(parts.rover, parts.layout, parts.models, 0.0)
+    process = SinkageProcess(parts.rover, parts.layout, parts.models)
 
     def goes_on(seconds, speed, read=()):
         ekf.x[SPEED] = speed
@@ -448,22 +448,6 @@ def test_wheels_sink_backwards_as_they_do_forwards(parts, ekf):
         assert travel > 0.0 and (found[-1][0] < 0.05).all()
     for forward, backward in zip(*found, strict=True):
         np.testing.assert_array_equal(forward, backward)
-
-
-def test_the_error_of_a_measured_leaving_angle_loosens_the_sinkage(parts, ekf):
-    """A deviation of the angle adds the square of what such a step of it changes the sinkage."""
-    part, std = parts.layout.sinkage, 0.01
-
-    def predicted(angle, angle_std):
-        prediction, _ = sinkage_predicted(parts, ekf.x, angle=angle, angle_std=angle_std)
-        return prediction.mean[part], np.diagonal(prediction.Q)[part]
-
-    here, sure = predicted(-0.2, 0.0)
-    there, _ = predicted(-0.2 - std, 0.0)
-    _, unsure = predicted(-0.2, std)
-    assert (np.abs(there - here) > 1e-7).all()
-    assert unsure - sure == pytest.approx((there - here) ** 2, rel=0.05)
-    assert (predicted(NAN, std)[1] == predicted(NAN, 0.0)[1]).all()
 
 
 # -- Soil -------------------------------------------------------------------------------------

@@ -167,7 +167,7 @@ class WheelSoilEstimator:
         # The filter: process and measurements.
         self._ekf = initial_filter(configuration, rover, sensors, layout, models, level)
         self._speed = SpeedProcess(configuration, rover, sensors)
-        self._sinkage_process = SinkageProcess(rover, layout, models, angle_std)
+        self._sinkage_process = SinkageProcess(rover, layout, models)
         self._soil_process = SoilProcess(configuration, layout)
         self._reference = ReferenceUpdate(configuration, rover, sensors, layout)
         self._zero_velocity = ZeroVelocityUpdate(rover)

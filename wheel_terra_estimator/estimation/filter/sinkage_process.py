@@ -72,19 +72,13 @@ class _Motion(NamedTuple):
 
 
 class SinkageProcess(Component[SinkageState]):
-    """Predicts the sinkage of all wheels, and tracks its rate.
+    """Predicts the sinkage of all wheels, and tracks its rate."""
 
-    `leaving_angle_std` is the deviation of a measured leaving angle after smoothing [rad].
-    """
-
-    def __init__(
-        self, rover: Rover, layout: StateLayout, models: WheelModels, leaving_angle_std: float
-    ) -> None:
+    def __init__(self, rover: Rover, layout: StateLayout, models: WheelModels) -> None:
         n = rover.wheel_count
         none = np.full((2, n), np.nan)
         super().__init__(SinkageState(none, (0.0,) * n, (_FIRST_RATE_STD,) * n, np.zeros(n)))
         self._rover, self._layout, self._models = rover, layout, models
-        self._leaving_angle_std = leaving_angle_std
         self._entries = np.arange(layout.size)[layout.sinkage]
 
     def predict(self, prediction: Prediction, x: FloatArray, cycle: Cycle) -> float:
@@ -152,11 +146,6 @@ class SinkageProcess(Component[SinkageState]):
             unmodelled_std=np.where(relaxes, unmodelled_std, self.state.unmodelled_std),
         )
         noise = (_LAW_ERROR * floored) ** 2 * 2.0 * alpha + _WALK * dt
-        if states.leaving_angle is not None:
-            angle = states.leaving_angle - self._leaving_angle_std
-            there = self._models.bearing(states._replace(leaving_angle=angle)).load
-            error = (sensitivity * np.log(carried[0] / there)) ** 2
-            noise += np.where(np.isnan(angle), 0.0, error)
         zi = self._entries[relaxes]
         ki = zi - layout.sinkage.start + layout.stiffness.start
         prediction.mean[zi] = (z + alpha * (target - z))[relaxes]
