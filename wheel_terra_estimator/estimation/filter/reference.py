@@ -123,12 +123,8 @@ class ReferenceUpdate(Component[ReferenceState]):
 
     def innovation(self, ekf: GatedFilter, reference: ReferenceVelocity) -> tuple[float, float]:
         """Return the innovation [m/s] and the variance h P h' of its prediction."""
-        if self._error is None:
-            state, variance = float(ekf.x[SPEED]), float(ekf.P[SPEED, SPEED])
-        else:
-            state = float(self._row @ ekf.x)
-            variance = float(self._row @ ekf.P @ self._row)
-        return reference.forward - state, variance
+        variance = float(self._row @ ekf.P @ self._row)
+        return reference.forward - float(self._row @ ekf.x), variance
 
     def known(self, time: float) -> bool:
         """Return whether the last reference that shows slip is younger than `_KNOWN_TIME`."""

@@ -42,7 +42,6 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
         # Entries of the zeros in the rows, as index arrays made once.
         columns = np.arange(layout.size)[layout.torque_zero]
         self._ones = (np.arange(len(columns)), columns)
-        self._known = bool(len(columns))
         self._none = (0.0,) * layout.wheel_count
         self._load_std = rover.load_std
 
@@ -54,7 +53,7 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
 
     def zeros(self, mean: FloatArray) -> Floats:
         """Return the zeros of the sensors in a state [N m]."""
-        return tuple(mean[self._zeros].tolist()) if self._known else self._none
+        return tuple(mean[self._zeros].tolist()) or self._none
 
     def update(
         self,
@@ -74,10 +73,8 @@ class TorqueUpdate(Component['tuple[float | None, ...]']):
         `repeats` cycles are one and the same (same ground).
         """
         rows, means = [], list(self.state)
-        H, zeros = forces.torque_rows, self.zeros(ekf.x)
-        if self._known:
-            H = H.copy()
-            H[self._ones] = 1.0
+        H, zeros = forces.torque_rows.copy(), self.zeros(ekf.x)
+        H[self._ones] = 1.0
         priors = np.einsum('ij,ij->i', H @ ekf.P, H).tolist()
         models, noises = forces.torque.tolist(), forces.torque_noise.tolist()
         for i, reading in enumerate(cycle.torque):
