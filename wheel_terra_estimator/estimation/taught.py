@@ -80,6 +80,13 @@ class Taught:
             return f'not distinguishable from {self.confounded_with}'
         return 'assumed, not learned'
 
+    def with_unit(self, std: float) -> str:
+        """Return a deviation for a reader."""
+        if self.unit == RELATIVE:
+            digits = 0 if std > 0.1 else 1
+            return f'{100.0 * std:.{digits}f} %'
+        return f'{std:.2g} {self.unit}'.rstrip(' -')
+
 
 def with_model_errors(mean: FloatArray, covariance: FloatArray, layout: StateLayout) -> FloatArray:
     """Return the (size, size) covariance of the filter with the model errors of the soil added."""
