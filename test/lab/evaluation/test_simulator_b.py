@@ -80,10 +80,11 @@ def test_loads_balance_weight_and_moments_whatever_carries_them():
     rover = vehicle.Vehicle(180.0, 9.81, (0.02, 0.01, 0.45), shape, x, y, pivots, 30.0)
     force = vehicle.ChassisForce(2.0, 0.7, 9.5)
     pull = 180.0 * 2.0 * np.array([0.1, 0.2, 0.15, 0.2, 0.05, 0.3])
+    lead = np.array([3.0, 5.0, 2.0, 4.0, 1.0, 6.0])  # the soil holds the wheels: T - F r
     for suspension in (pivots, None):
-        loads = vehicle.wheel_loads(replace(rover, suspension=suspension), force, pull)
+        loads = vehicle.wheel_loads(replace(rover, suspension=suspension), force, pull, lead)
         assert loads.sum() == pytest.approx(180.0 * 9.5)
-        assert loads @ x == pytest.approx(180.0 * (9.5 * 0.02 - 2.0 * 0.45))
+        assert loads @ x + lead.sum() == pytest.approx(180.0 * (9.5 * 0.02 - 2.0 * 0.45))
         assert loads @ y == pytest.approx(180.0 * (9.5 * 0.01 - 0.7 * 0.45))
 
 

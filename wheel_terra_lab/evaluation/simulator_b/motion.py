@@ -111,7 +111,9 @@ class Plant:
         n = vehicle.count
         slopes = world.ground.slopes(0.0, 0.0, 0.0)
         force = _standing(vehicle.gravity, slopes)
-        load = wheel_loads(vehicle, force, np.full(n, vehicle.mass * force.forward / n))
+        load = wheel_loads(
+            vehicle, force, np.full(n, vehicle.mass * force.forward / n), np.zeros(n)
+        )
         self._ahead = np.stack([np.ones(n), np.zeros(n), -vehicle.y])
         self._aside = np.stack([np.zeros(n), np.ones(n), vehicle.x])
         self._lever, self._lateral_lever = self._ahead, self._aside
@@ -209,7 +211,8 @@ class Plant:
     def _loads(self) -> FloatArray:
         s, world = self.state, self.world
         forward = s.forces.pull * np.cos(s.steering) - s.forces.side * np.sin(s.steering)
-        loads = wheel_loads(world.vehicle, s.force, forward)
+        lead = (s.forces.torque - s.forces.pull * world.vehicle.shape.radius) * np.cos(s.steering)
+        loads = wheel_loads(world.vehicle, s.force, forward, lead)
         place = np.asarray(s.x), np.asarray(s.y)
         errors = np.array([float(e.at(*place)) for e in world.load_errors])
         changed = loads * (1.0 + errors)

@@ -63,46 +63,47 @@ def wheel_loads(
     vehicle: Vehicle,
     force: ChassisForce,  # what accelerometers in the centre of gravity would read
     pull: FloatArray,  # (n,) longitudinal forces of the soil, which act at the ground [N]
+    lead: FloatArray,  # (n,) moments of the loads about the hubs: they act ahead of them [N m]
 ) -> FloatArray:
     """Return the loads normal to the ground (n,) [N] in quasi-static balance."""
     if vehicle.suspension is None:
-        loads = _rigid(vehicle, force)
+        loads = _rigid(vehicle, force, lead)
     else:
-        loads = _rocker_bogie(vehicle, vehicle.suspension, force, pull)
+        loads = _rocker_bogie(vehicle, vehicle.suspension, force, pull, lead)
     total = vehicle.mass * force.up
     loads = np.maximum(loads, _LEAST_SHARE * total / vehicle.count)
     return np.asarray(loads * total / loads.sum())
 
 
-def _moments(vehicle: Vehicle, force: ChassisForce) -> tuple[float, float, float]:
+def _moments(vehicle: Vehicle, force: ChassisForce, lead: FloatArray) -> tuple[float, float, float]:
     """Return what the loads sum to: sum W, sum W x, sum W y."""
     x, y, z = vehicle.centre
     m = vehicle.mass
     return (
         m * force.up,
-        m * (force.up * x - force.forward * z),
+        m * (force.up * x - force.forward * z) - float(lead.sum()),
         m * (force.up * y - force.left * z),
     )
 
 
-def _rigid(vehicle: Vehicle, force: ChassisForce) -> FloatArray:
+def _rigid(vehicle: Vehicle, force: ChassisForce, lead: FloatArray) -> FloatArray:
     """Loads that grow linearly over the plan of the rover: equally soft ground below a slab."""
     shape = np.stack([np.ones(vehicle.count), vehicle.x, vehicle.y])
-    factors = np.linalg.solve(shape @ shape.T, np.array(_moments(vehicle, force)))
+    factors = np.linalg.solve(shape @ shape.T, np.array(_moments(vehicle, force, lead)))
     return np.asarray(factors @ shape)
 
 
 def _rocker_bogie(
-    vehicle: Vehicle, pivots: RockerBogie, force: ChassisForce, pull: FloatArray
+    vehicle: Vehicle, pivots: RockerBogie, force: ChassisForce, pull: FloatArray, lead: FloatArray
 ) -> FloatArray:
     """Six loads from six balances: total, roll, two bogies, and two rockers with a differential.
 
     A force (F forward, W up) at a place (x, z) turns a part about its pivot (xp, zp) by
-    (z - zp) F - (x - xp) W, nose-down positive; contacts are at z = 0. The differential gives
-    each rocker half of the pitching moment of the body.
+    (z - zp) F - (x - xp) W, nose-down positive; contacts are at z = 0, ahead of the hubs. The
+    differential gives each rocker half of the pitching moment of the body.
     """
     (xr, zr), (xb, zb) = pivots.rocker, pivots.bogie
-    total, _, roll = _moments(vehicle, force)
+    total, _, roll = _moments(vehicle, force, lead)
     cx, _, cz = vehicle.centre
     m = vehicle.mass
     # The body hangs on the rocker pivots; its moment about them, nose-down positive.
@@ -116,10 +117,10 @@ def _rocker_bogie(
         wheels = wheels[np.argsort(-vehicle.x[wheels])]
         alone, pair = (wheels[0], wheels[1:]) if pivots.bogie_behind else (wheels[2], wheels[:2])
         matrix[row, pair] = vehicle.x[pair] - xb
-        right[row] = -zb * pull[pair].sum()
+        right[row] = -zb * pull[pair].sum() - lead[pair].sum()
         # Rocker: its own wheel, and what the bogie brings to its pivot.
         matrix[row + 1, alone] = -(vehicle.x[alone] - xr)
         matrix[row + 1, pair] = -(xb - xr)
-        right[row + 1] = -0.5 * body + zr * pull[alone] - (zb - zr) * pull[pair].sum()
+        right[row + 1] = -0.5 * body + zr * pull[alone] - (zb - zr) * pull[pair].sum() + lead[alone]
         row += 2
     return np.asarray(np.linalg.solve(matrix, right))

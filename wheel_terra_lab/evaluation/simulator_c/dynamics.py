@@ -129,7 +129,10 @@ class Motion:
         heights = self.land.height(*place)
         n = rover.count
         loads, self._level = self._suspension.loads(
-            heights[:n] - contacts.sinkage, force, self._bogie_pull
+            heights[:n] - contacts.sinkage,
+            force,
+            self._bogie_pull,
+            along[:, 0] * (state.torque - state.pull * rover.rims.radius),
         )
         x, y = place[0][:n], place[1][:n]
         lead, heading = contacts.lead(), state.yaw + state.steering

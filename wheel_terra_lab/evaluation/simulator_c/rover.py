@@ -199,9 +199,10 @@ class Suspension:
         heights: FloatArray,  # (n,) of the bottoms of the wheels along the normal [m]
         force: FloatArray,  # (3,) gravity and inertia at the centre of gravity: x, y, down [N]
         bogie_pull: FloatArray,  # (2,) of the wheels of the left and right bogie [N]
+        lead: FloatArray,  # (n,) moments of the loads about the hubs: they act ahead of them [N m]
     ) -> tuple[FloatArray, tuple[float, float]]:
         """Return (n,) loads [N] and the sines of pitch (nose up) and roll (left side up)."""
-        moments = self._moments(force, bogie_pull)
+        moments = self._moments(force, bogie_pull, lead)
         by_height, by_moment, inverse, transfer = self._solved
         loads = by_height @ heights + by_moment @ moments
         freedoms = inverse @ (transfer @ heights - moments)
@@ -215,15 +216,15 @@ class Suspension:
             loads *= force[2] / max(loads.sum(), 1e-6)
         return loads, self._attitude(freedoms)
 
-    def _moments(self, force: FloatArray, bogie_pull: FloatArray) -> FloatArray:
+    def _moments(self, force: FloatArray, bogie_pull: FloatArray, lead: FloatArray) -> FloatArray:
         """Return the generalised loads: sums over the wheels of load times mode."""
         x, y, height = self._rover.centre
-        along = force[2] * x + height * force[0]
+        along = force[2] * x + height * force[0] - lead.sum()
         across = force[2] * y + height * force[1]
         if not self._bogies:
             return np.array([force[2], along, across])
         sides = 0.5 * force[2] + np.array([1.0, -1.0]) * across / self._track
-        bogies = -self._rover.bogie_height * bogie_pull
+        bogies = -self._rover.bogie_height * bogie_pull - [lead[2:][::2].sum(), lead[3:][::2].sum()]
         rockers = 0.5 * (along - self._pivot * force[2]) - bogies
         return np.concatenate([sides, rockers, bogies])
 
