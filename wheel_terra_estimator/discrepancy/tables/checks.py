@@ -270,12 +270,16 @@ def _check_dead_columns(table: SteadyTable, remarks: list[str]) -> None:
                 f'{quantity} is exactly 0 in {noughts} rows: taken as measured; where nothing '
                 'was, leave the cell empty'
             )
-        if len(values) >= MINIMUM_ROWS and np.ptp(values) == 0.0:
-            raise UserError(
-                f'{table.name}, line {table.lines[here][0]}, column {quantity}: {values[0]:g} '
-                f'{unit_of(quantity)} in all {len(values)} rows; no measurement is that constant: '
-                'leave the column out'
-            )
+        if len(values) < MINIMUM_ROWS or np.ptp(values) > 0.0:
+            continue
+        said = f'{values[0]:g} {unit_of(quantity)} in all {len(values)} rows'
+        if np.isfinite(table.stated_std[here, q]).all():
+            remarks.append(f'{quantity} is {said}: taken as measured, with its stated deviation')
+            continue
+        raise UserError(
+            f'{table.name}, line {table.lines[here][0]}, column {quantity}: {said}; no '
+            f'measurement is that constant: leave the column out, or state its {quantity}_std'
+        )
 
 
 def _without_held_readings(table: SteadyTable, remarks: list[str]) -> SteadyTable:
