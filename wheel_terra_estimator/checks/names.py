@@ -41,18 +41,16 @@ def check_required(recording: Recording, facts: RoverFacts) -> list[Outcome]:
             cure = f'-p wheel_odometry:=odom --remap odom:={other.topic}'
             if not facts.known:
                 cure = 'wheel-terra init --bag BAG --wheels NAMES makes a rover file for that'
-        words: dict[str, Any] = {
-            'what': 'wheel rates',
-            'effect': 'there is nothing to estimate',
-            'how': cure,
-        }
-        outcomes.append(found('missing_input', f'/{own}', 0.999, **words))
+        outcomes.append(_required(own, 'wheel rates', 'there is nothing to estimate', cure))
     if recording.imu is None:
         effect = 'slip then rests on a reference velocity alone, and the slope is unknown'
         cure = 'record the IMU, or name its topic: --remap imu/data:=/TOPIC'
-        words = {'what': 'IMU', 'effect': effect, 'how': cure}
-        outcomes.append(found('missing_input', '/imu/data', 0.999, **words))
+        outcomes.append(_required('imu/data', 'IMU', effect, cure))
     return outcomes
+
+
+def _required(own: str, what: str, effect: str, cure: str) -> Finding:
+    return found('missing_input', f'/{own}', 0.999, what=what, effect=effect, how=cure)
 
 
 def check_topics(
