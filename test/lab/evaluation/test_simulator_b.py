@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wheel_terra_estimator.estimation.contacts.load_distribution import load_distribution
 from wheel_terra_estimator.estimation.measurements import (
     InertialReading,
     ReferenceVelocity,
@@ -74,6 +75,7 @@ def test_reverse_mirrors_forward_and_sideways_motion_takes_from_the_pull():
 
 
 def test_loads_balance_weight_and_moments_whatever_carries_them():
+    """By sums over all wheels, and part by part as the estimator's, which another hand derived."""
     x, y = np.array([0.6, 0.6, 0.0, 0.0, -0.6, -0.6]), np.array([0.5, -0.5] * 3)
     shape = wheel_soil.WheelShape(*(np.full(6, v) for v in (0.12, 0.16, 0.005, 24.0)))
     pivots = vehicle.RockerBogie((0.0, 0.35), (-0.3, 0.22))
@@ -86,6 +88,18 @@ def test_loads_balance_weight_and_moments_whatever_carries_them():
         assert loads.sum() == pytest.approx(180.0 * 9.5)
         assert loads @ x + lead.sum() == pytest.approx(180.0 * (9.5 * 0.02 - 2.0 * 0.45))
         assert loads @ y == pytest.approx(180.0 * (9.5 * 0.01 - 0.7 * 0.45))
+        ours = load_distribution(
+            mass=180.0,
+            position=np.column_stack([x, y]),
+            centre_of_gravity=(0.02, 0.01, 0.45),
+            contact_height=0.0,
+            suspension='rocker_bogie' if suspension else 'rigid',
+            shares=np.ones(6),
+            rocker_pivot=pivots.rocker,
+            bogie_pivot=pivots.bogie,
+            bogie_wheels='rear',
+        )
+        assert loads == pytest.approx(ours.loads((2.0, 0.7, 9.5), pull, lead))
 
 
 @pytest.fixture(scope='module')
