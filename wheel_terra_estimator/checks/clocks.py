@@ -514,7 +514,7 @@ def check_transport(
                 how = f'they come in bursts, stamped up to {wait:.2g} s late when they are read'
                 outcomes.append(found('order', channel.topic, 0.99, how=how))
             mended[name] = channel = one = even
-        aged = name not in ('joints', 'imu')  # these are fused late
+        aged = name not in ('joints', 'imu')  # references and sinkages, fused late
         order, jumps = _order(one, aged), _steps(channel, aged)
         step = float(jumps[np.argmax(np.abs(jumps))])
         outcomes += order

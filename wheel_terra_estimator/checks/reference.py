@@ -82,16 +82,17 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     if there is None:
         return [], evidence
     reference, rim = there
-    forward = moving_mean(reference.velocity[:, 0], LEAST_ROWS)  # noise of one at rest is no way
-    if hardly_moves(reference.velocity[:, 0], np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
+    forward = reference.velocity[:, 0]
+    if hardly_moves(forward, np.abs(rim) >= 0.4 * np.quantile(np.abs(rim), 0.9)):
         return [], evidence  # wheels that spin on the spot
-    least = 0.4 * float(np.quantile(np.abs(forward), 0.9))
-    ahead, back = (forward > least).sum(), (forward < -least).sum()
+    mean = moving_mean(forward, LEAST_ROWS)  # noise about 0 is no motion
+    least = 0.4 * float(np.quantile(np.abs(mean), 0.9))
+    ahead, back = (mean > least).sum(), (mean < -least).sum()
     both = min(ahead, back) > SELDOM_NEGATIVE * (ahead + back)
-    speed = np.interp(evidence.time, evidence.seconds(reference), forward)
+    speed = np.interp(evidence.time, evidence.seconds(reference), mean)
     cut = _cut_off(evidence, speed > least, speed < -least)
-    share = -forward[forward < -least] / np.maximum(rim[forward < -least], 1e-9)
-    unsigned = cut or (_without_sign(rim, forward) and not _slides(evidence, speed < -least, share))
+    share = -mean[mean < -least] / np.maximum(rim[mean < -least], 1e-9)
+    unsigned = cut or (_without_sign(rim, mean) and not _slides(evidence, speed < -least, share))
     if not both or _sideways(reference) or not unsigned:
         return [], evidence
     if _direction(evidence, reference, rim)[1]:  # back in the world, not by the rover
@@ -99,7 +100,7 @@ def check_unsigned(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
     # In turns the sides may be unlike; of what was cut off at 0 nothing is known.
     unknown = (evidence.moving & ~evidence.unturned)[:, None]
     if cut:
-        goes_back = speed < -CLEAR_SPEED * bend_noise(reference.velocity[:, 0])
+        goes_back = speed < -CLEAR_SPEED * bend_noise(forward)
         unknown = unknown | (evidence.rate == 0.0) & goes_back[:, None]
     rate = np.where(unknown, np.nan, evidence.rate * np.sign(speed)[:, None])
     finding = evidence.found('rates_unsigned', 0.95, other='reference goes')

@@ -662,8 +662,9 @@ def check_gyro_scale(evidence: Evidence) -> tuple[list[Outcome], Evidence]:
         cure, both = block_fit(np.column_stack([gyro, one]), seen)[0], np.column_stack([seen, one])
         parts = [fit[0].value for fit in block_fits(both, np.column_stack([aside, across, gyro]))]
         off = min((cure.value - 1.0, 1.0 / math.hypot(*parts) - 1.0), key=abs)
-        of_twist = name != 'orientation' and as_fast_as_rims(evidence, cure.value)
-        if abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std) and not of_twist:
+        scaled = abs(off) > max(LEAST_SCALE, SCALE_SIGMAS * cure.std)
+        # Turns of a reference whose speeds have the same scale are its error.
+        if scaled and (name == 'orientation' or not as_fast_as_rims(evidence, cure.value)):
             details = {'times': 1.0 / cure.value, 'against': name}
             finding = evidence.found('gyro_scale', 0.9, value=cure.value, std=cure.std, **details)
             times = np.array([1.0, 1.0, cure.value])

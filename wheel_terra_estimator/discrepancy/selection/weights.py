@@ -136,12 +136,10 @@ def linear_starts(setting: Setting, base: Fit, names: Sequence[str]) -> list[tup
     It comes from the signatures at the base fit. An effect's second parameter (an onset, a
     depth) has no gradient while its strength is nil, so a few values of it compete.
     """
-    trials = [
-        (name, own, shape)
-        for name in names
-        for own in (effect_coordinates(setting.effects[name]),)
-        for shape in shapes(own, setting.deepest, 0.0)
-    ]
+    trials: list[tuple[str, tuple[Coordinate, ...], FloatArray]] = []
+    for name in names:
+        own = effect_coordinates(setting.effects[name])
+        trials += [(name, own, shape) for shape in shapes(own, setting.deepest, 0.0)]
     if not trials:
         return []
     state = setting.forward.solve(

@@ -224,7 +224,7 @@ class Suspension:
         if not self._bogies:
             return np.array([force[2], along, across])
         sides = 0.5 * force[2] + np.array([1.0, -1.0]) * across / self._track
-        bogies = -self._rover.bogie_height * bogie_pull - [lead[2:][::2].sum(), lead[3:][::2].sum()]
+        bogies = -self._rover.bogie_height * bogie_pull - [lead[2::2].sum(), lead[3::2].sum()]
         rockers = 0.5 * (along - self._pivot * force[2]) - bogies
         return np.concatenate([sides, rockers, bogies])
 
